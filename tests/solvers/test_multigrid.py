@@ -10,7 +10,7 @@ import xcrack.linalg.multigrid as multigrid
 from xcrack.fem.assembly import bulk, rigid_modes
 from xcrack.linalg.kernels.cycle import first_step, next_step
 from xcrack.linalg.multigrid import extended_cycle, hierarchy, largest_eigenvalue
-from xcrack.linalg.products import BorderedFactor, row_blocks, stored
+from xcrack.linalg.products import BorderedFactor, row_blocks, store_blocks
 from xcrack.linalg.projected_cg import Operator, conjugate_gradients
 from xcrack.mesh.simplex import node_points
 from xcrack.model.elasticity import elasticity
@@ -61,7 +61,7 @@ def test_blocks_are_stored_without_a_matrix_in_between(size):
     for M in (A, sp.bsr_matrix(A.T, blocksize=size[::-1]), A @ B):
         first = np.arange(0, M.shape[0] + 1, M.blocksize[0])
         for dtype in (np.float32, np.float64):
-            ours, wanted = stored(M, dtype), row_blocks([M.tocsr()], first, dtype)
+            ours, wanted = store_blocks(M, dtype), row_blocks([M.tocsr()], first, dtype)
             assert ours.shape == wanted.shape
             for name in ("first", "start", "offset", "columns", "values"):
                 result, other = getattr(ours, name), getattr(wanted, name)

@@ -11,7 +11,7 @@ from xcrack.analysis.solve import build
 from xcrack.fem.assembly import boundary_points
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, n_parts, part_numbers, segment_points
-from xcrack.mesh.simplex import conical, simplex_rule
+from xcrack.mesh.simplex import conical_rule, simplex_rule
 
 
 def moment(powers):
@@ -34,7 +34,7 @@ def test_rules_are_exact_to_their_degree(dim, degree):
 
 def test_conical_points_lie_inside():
     for n in range(1, 9):
-        bary, weight = conical(2, n)
+        bary, weight = conical_rule(2, n)
         assert bary.min() > 0
         assert weight.min() > 0
 
@@ -66,7 +66,7 @@ def test_cells_are_filled_and_cubics_exact(tip):
             points.weight * x[:, 0] ** powers[0] * x[:, 1] ** powers[1],
             len(mesh.cells),
         )
-        bary, weight = conical(2, 4)
+        bary, weight = conical_rule(2, 4)
         y = np.einsum("qb,cbd->cqd", bary, mesh.points[mesh.cells[cells]])
         exact = mesh.volume[cells] * (y[..., 0] ** powers[0] * y[..., 1] ** powers[1] @ weight)
         np.testing.assert_allclose(total[cells], exact, atol=1e-13)  # round-off

@@ -9,7 +9,7 @@ import xcrack as xc
 from support import scenes_3d as scenes
 from support.scenes_2d import numerics_of
 from xcrack.analysis.solve import build
-from xcrack.fem.assembly import boundary_points, corrected
+from xcrack.fem.assembly import boundary_points, corrected_gradients
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import (
     Points,
@@ -21,7 +21,7 @@ from xcrack.fem.quadrature import (
     sub_cells,
     triangle_points,
 )
-from xcrack.mesh.simplex import conical
+from xcrack.mesh.simplex import conical_rule
 
 CRACKS = {
     "oblique": xc.penny_crack((0.013, 0.021, 0.034), (0.1, 0.2, 1.0), 0.5),
@@ -44,7 +44,7 @@ def with_tip(space):
 def moments(space, cells, points):
     """Largest error of the moments of each degree in the cells, relative to their volume."""
     x = position(space, points.cell, points.bary)
-    bary, weight = conical(3, 4)
+    bary, weight = conical_rule(3, 4)
     y = np.einsum("qb,cbd->cqd", bary, space.mesh.points[space.mesh.cells[cells]])
     error = np.zeros(3)
     for powers in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 0, 0), (0, 1, 1), (0, 0, 2)):
@@ -111,7 +111,7 @@ def brute_force(space, cells, levels):
     """Points by cutting in eight towards the front, with no map at all."""
     subs = sub_cells(space, cells)
     bary, share, number = subs.bary, subs.fraction, np.arange(len(subs.cell))
-    rule, weight = conical(3, 3)
+    rule, weight = conical_rule(3, 3)
     parts = []
     for level in range(levels + 1):
         nodes = space.mesh.cells[subs.cell[number]]
@@ -140,7 +140,7 @@ def gram(space, lips, cell, points, consistent):
     if consistent:
         boundary = boundary_points(space, np.array([cell]), lips)
         part = (row, points.bary, points.weight, points.side)
-        G = corrected(space, batch, part, N, G.copy(), boundary)
+        G = corrected_gradients(space, batch, part, N, G.copy(), boundary)
     return np.einsum("q,qad,qbd->ab", points.weight, G, G)
 
 
@@ -200,7 +200,7 @@ def test_triangles_with_roots_of_the_distance():
     np.testing.assert_allclose(result[1], r.mean(axis=1), rtol=1e-13)
     square = ((r**2).sum(axis=1) + r[:, 0] * r[:, 1] + r[:, 0] * r[:, 2] + r[:, 1] * r[:, 2]) / 6
     np.testing.assert_allclose(result[2], square, rtol=1e-12)
-    fine, share = conical(2, 12)
+    fine, share = conical_rule(2, 12)
     wanted = np.sqrt(r @ fine.T) @ share
     # The first two by closed form: 2 int (1 - x) sqrt(x), 2 int x sqrt(x).
     wanted[:2] = 8 / 15, 4 / 5
@@ -235,7 +235,7 @@ def test_the_correction_closes_the_defect(name):
         number, row, _ = points.of_cells(batch.cells)
         bary, weight, side = points.bary[number], points.weight[number], points.side[number]
         N, G = space.tabulate(batch, row, bary, side)
-        fixed = corrected(space, batch, (row, bary, weight, side), N, G.copy(), boundary)
+        fixed = corrected_gradients(space, batch, (row, bary, weight, side), N, G.copy(), boundary)
         chosen = np.isin(boundary.cell, batch.cells)
         brow = np.searchsorted(batch.cells, boundary.cell[chosen])
         values, _ = space.tabulate(batch, brow, boundary.bary[chosen], boundary.side[chosen])

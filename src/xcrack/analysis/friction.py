@@ -449,7 +449,7 @@ def solve_friction(
     rubbing = [face for face in faces if face.mu > 0]
     along = [face.along[k] for k in range(model.space.dim - 1) for face in rubbing]
     N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
-    small = engine.condensed(N, f, u_imposed)
+    small = engine.condense(N, f, u_imposed)
     rows = _rows(faces, small.dual, stiffness)
     if springs is not None:
         every = np.concatenate(springs)

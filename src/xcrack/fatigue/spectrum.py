@@ -242,7 +242,7 @@ class Spectrum(Declared):
         return replace(self, factors=self.factors * factor, least_range=self.least_range * factor)
 
 
-def distinct(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
+def distinct_cycles(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
     """Pairs (min, max) that differ `(p, 2)`, count of each `(p,)`, and which each cycle is."""
     pairs = np.stack([cycles["min"], cycles["max"]], axis=1)
     values, which = np.unique(pairs, axis=0, return_inverse=True)

@@ -125,7 +125,7 @@ def _lip_parts(
     return parts
 
 
-def corrected(
+def corrected_gradients(
     space: FunctionSpace,
     batch: Batch,
     points: tuple[Ints, Floats, Floats, Ints],
@@ -582,7 +582,7 @@ def enriched_stiffness(
         bary, weight, side = points.bary[number], points.weight[number], points.side[number]
         N, G = space.tabulate(batch, row, bary, side)
         if batch.tips and boundary is not None:
-            G = corrected(space, batch, (row, bary, weight, side), N, G, boundary)
+            G = corrected_gradients(space, batch, (row, bary, weight, side), N, G, boundary)
         return (
             material,
             batch.functions,

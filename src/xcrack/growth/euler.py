@@ -73,10 +73,10 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         tip=row,
         largest=largest,
     )
-    return plan.with_cracks(lambda: advanced(rule, step, way))
+    return plan.with_cracks(lambda: advanced_cracks(rule, step, way))
 
 
-def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
+def advanced_cracks(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     """The cracks after the advance of their stations."""
     mesh = rule.problem.mesh
     stations = solves_of(step)[0]
@@ -99,7 +99,7 @@ def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
 
 def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
     """The cracks after a part of a planned advance."""
-    return advanced(rule, step, part * plan.arc)
+    return advanced_cracks(rule, step, part * plan.arc)
 
 
 def ends_of(step: Step, plan: Plan) -> Floats:
@@ -318,7 +318,7 @@ def elapsed_3d(
 
 __all__ = [
     "advance_of",
-    "advanced",
+    "advanced_cracks",
     "begin",
     "begin_at",
     "correct",

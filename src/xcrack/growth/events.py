@@ -112,7 +112,7 @@ class Arriving:
     label: str = ""
 
 
-def arriving(step: Step, problem: Problem) -> list[Arriving]:
+def coming_arrivals(step: Step, problem: Problem) -> list[Arriving]:
     """Ends that come to the boundary in the advance after a step, with the facet sets there."""
     plan, mesh = plan_of(step), problem.mesh
     if mesh.dim == 2:
@@ -295,7 +295,7 @@ def _parts(start: Floats, move: Floats, body: Body) -> Floats:
 __all__ = [
     "Arriving",
     "arrivals_of",
-    "arriving",
+    "coming_arrivals",
     "cut_off",
     "ended_crack",
     "have_left",

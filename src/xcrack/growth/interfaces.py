@@ -316,7 +316,7 @@ def _first_end(piece: Stretch, target: Floats) -> tuple[float, int]:
     return length, first
 
 
-def mixed(own: SolveHistory, after: SolveHistory, sets: Ints, passed: Bools) -> SolveHistory:
+def mixed_solves(own: SolveHistory, after: SolveHistory, sets: Ints, passed: Bools) -> SolveHistory:
     """What solves say of ends of which some have passed into another set.
 
     Parameters
@@ -460,7 +460,7 @@ __all__ = [
     "cycles_across",
     "cycles_of_jump",
     "interfaces_ahead",
-    "mixed",
+    "mixed_solves",
     "passage",
     "rates_behind",
     "rates_in_set",

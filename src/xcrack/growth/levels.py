@@ -13,7 +13,7 @@ from xcrack.base.checks import call_function, numbers
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
 from xcrack.fatigue.cycle import Cycle
-from xcrack.fatigue.spectrum import Spectrum, distinct
+from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.response import Response, checked_response, respond
 from xcrack.linalg.engine import SolverState
@@ -74,7 +74,7 @@ class LevelResponse:
         return self.whole.sif[self.row]
 
 
-def refined(
+def refined_response(
     problem: Problem, spectrum: Spectrum, first: Floats, solve: Solve, reuse: SolverState
 ) -> Response:
     """Response at levels that are as dense as K and the growth of a block ask for.
@@ -157,7 +157,7 @@ def _with_nearest_sets(
 
 def _ends(spectrum: Spectrum, low: float, high: float) -> tuple[Floats, Ints, Floats]:
     """Even factors, both ends of the kinds of cycles among them `(2, p)`, and how often."""
-    values, count, _ = distinct(spectrum.cycles)
+    values, count, _ = distinct_cycles(spectrum.cycles)
     rows = np.rint((values - low) / (high - low) * (_POINTS - 1)).astype(np.int64)
     pairs, which = np.unique(rows, axis=0, return_inverse=True)
     number = np.bincount(which.reshape(-1), weights=count, minlength=len(pairs)).astype(float)
@@ -242,7 +242,7 @@ def respond_to_levels(
         factors = np.linspace(low, high, _FIRST)
     if exact or spectrum.levels != "auto":
         return solve(states_of(spectrum, factors), reuse)
-    return refined(problem, spectrum, factors, solve, reuse)
+    return refined_response(problem, spectrum, factors, solve, reuse)
 
 
 def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[LevelTable]:
@@ -375,7 +375,7 @@ __all__ = [
     "is_homogeneous",
     "ladders",
     "load_factor_at",
-    "refined",
+    "refined_response",
     "respond_to_levels",
     "respond_to_states",
     "respond_under_program",

@@ -17,7 +17,7 @@ from xcrack.fatigue.law import Law
 from xcrack.fatigue.law_sets import LawSets, Names
 from xcrack.fatigue.rainflow import closed_cycles
 from xcrack.fatigue.retardation import BlockCycles, RetardationSets
-from xcrack.fatigue.spectrum import Spectrum, distinct
+from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.levels import has_slip, ladders, respond_to_states
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.response import Answers, Response
@@ -301,7 +301,9 @@ def _inputs_of_blocks(
 
         def rates_of_K(K: Floats) -> CycleRates:
             cycles = replace(pairs, K=K.reshape(shape))
-            return block_of(rated(rule, cycles, nu, c, place, a, free_pairs, names), pairs.count)
+            return block_of(
+                rates_by_kind(rule, cycles, nu, c, place, a, free_pairs, names), pairs.count
+            )
 
         def angle_of_K(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
             return rates_of_K(K).angle
@@ -438,7 +440,7 @@ def pairs_of(rule: GrowthRule, problem: Problem, response: Response) -> list[Ran
         nu = [problem.elasticity.poisson_at(sif.x) for sif in response.sif[0]]
         every = [np.stack([sif.K for sif in crack]) for crack in zip(*response.sif)]
         return [pairs_of_states(K, spectrum, own) for K, own in zip(every, nu, strict=True)]
-    values, count, _ = distinct(spectrum.cycles)
+    values, count, _ = distinct_cycles(spectrum.cycles)
     result = []
     for ladder in ladders(problem, spectrum, response):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
@@ -462,7 +464,7 @@ def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float | Floats) -> RangeP
     return RangePairs(np.stack([K[first], K[second]]), count[first, second])
 
 
-def rated(
+def rates_by_kind(
     rule: GrowthRule,
     pairs: RangePairs,
     nu: float | Floats,
@@ -563,7 +565,7 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
     omitted = spectrum.left_out
     if not len(omitted) or spectrum.least_range == 0:
         return 0.0
-    values, count, _ = distinct(omitted)
+    values, count, _ = distinct_cycles(omitted)
     worst = 0.0
     every = pairs_of(rule, problem, response)
     for c, ladder in enumerate(ladders(problem, spectrum, response)):
@@ -576,7 +578,7 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
         a = np.ones(f)
         small = RangePairs(K, np.repeat(count[:, None], f, axis=1))
         growth = [
-            block_of(rated(rule, pairs, nu, c, "tip", a, names=names), pairs.count).rate
+            block_of(rates_by_kind(rule, pairs, nu, c, "tip", a, names=names), pairs.count).rate
             for pairs in (small, every[c])
         ]
         grows = np.nonzero(growth[0])[0]
@@ -592,7 +594,7 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
 def block_order(rule: GrowthRule) -> Ints:
     """Kinds of the cycles of a block, in time `(c,)`, of a run with retardation."""
     assert isinstance(rule.cycle, Spectrum)
-    return distinct(rule.cycle.cycles)[2]
+    return distinct_cycles(rule.cycle.cycles)[2]
 
 
 def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
@@ -608,7 +610,7 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
         a = law_size(problem.mesh.dim, problem.sizes[c], pairs.K.shape[2])
         x = rates.response.sif[0][c].x
         nu, names = problem.elasticity.poisson_at(x), problem.elasticity.names_at(x)
-        every = rated(rule, pairs, nu, c, place, a, names=names)
+        every = rates_by_kind(rule, pairs, nu, c, place, a, names=names)
         parts.append((every.dK.T[None], every.R.T[None], a[None]))
     several = isinstance(rule.law, LawSets) or isinstance(rule.retardation, RetardationSets)
     sets = problem.elasticity.sets_at(rates.stations.x) if several else None
@@ -634,7 +636,7 @@ __all__ = [
     "left_out_share",
     "pairs_of",
     "pairs_of_states",
-    "rated",
+    "rates_by_kind",
     "rates_by_law_of",
     "rates_of",
     "response_without_contact",

@@ -32,7 +32,7 @@ from xcrack.growth.ends import (
 from xcrack.growth.events import (
     Arriving,
     arrivals_of,
-    arriving,
+    coming_arrivals,
     cut_off,
     ended_crack,
     have_left,
@@ -401,7 +401,7 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
     least = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip])
     longest = plan.length * plan.part
 
-    def beyond(length: float) -> float:
+    def length_beyond(length: float) -> float:
         return size_beyond(rule, _scene(rule, _with_length(rule, last, length)).sizes)
 
     try:
@@ -413,9 +413,9 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
             slope = (at_end - at_begin) / longest
             is_there = at_end >= -_SAME or longest < 2 * least or -at_end >= slope * least
             return last if is_there else _with_length(rule, last, longest - least - at_end / slope)
-        if beyond(least) >= 0:
+        if length_beyond(least) >= 0:
             return _with_length(rule, last, least)
-        length = brentq(beyond, least, longest, xtol=_SAME * least, rtol=1e-15)
+        length = brentq(length_beyond, least, longest, xtol=_SAME * least, rtol=1e-15)
         return _with_length(rule, last, length)
     except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
         return last
@@ -482,7 +482,7 @@ def _step_after(
         return None, reuse, cannot_go_on(last, error)
     if joins and problem.mesh.dim == 2:
         reuse = SolverState()  # what belongs to numbers of cracks is void
-    near = arriving(last, problem)
+    near = coming_arrivals(last, problem)
     if not any(placed.n_tips for placed in problem.placed):
         step = _last_step(rule, last, problem, near, joins)
         return step, reuse, ended

@@ -36,7 +36,7 @@ from xcrack.growth.interfaces import (
     InterfacesAhead,
     cycles_of_jump,
     interfaces_ahead,
-    mixed,
+    mixed_solves,
     passage,
     rates_behind,
     warn_of_passages,
@@ -155,7 +155,7 @@ def _up_to_interfaces(
     done = passage(
         rule,
         stations.frame,
-        lambda passed: mixed(own, after, near.after, passed),
+        lambda passed: mixed_solves(own, after, near.after, passed),
         near,
         goal,
         solves.start,
@@ -501,7 +501,7 @@ def _passed(
     goal = np.where(crosses, plan.arc, np.inf)
 
     def solves_in(passed: Bools) -> SolveHistory:
-        return mixed(own.last(2), after, near.after, passed) if passed.any() else own
+        return mixed_solves(own.last(2), after, near.after, passed) if passed.any() else own
 
     for most in _LONGER * plan.length:
         done = passage(

@@ -168,12 +168,12 @@ class DirectSystem:
         del latest
         if self.factor is None:
             return self._contact_by_solves(rows, f, u_imposed, start, opened)
-        small = self.condensed(rows.N, f, u_imposed)
+        small = self.condense(rows.N, f, u_imposed)
         states = self._sets(small.dual, small.gap, rows, start)
         u = small.displacements(np.stack([state.pressure for state in states], axis=1))
         return [replace(state, u=u[:, k], dual=small.dual) for k, state in enumerate(states)]
 
-    def condensed(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
+    def condense(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows see it; see `Engine`."""
         if self.factor is None:
             gap = N @ self.solve(f, u_imposed)

@@ -260,7 +260,7 @@ class Engine(Protocol):
         """
         ...
 
-    def condensed(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
+    def condense(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows `(g, n_dof)` see it, for load states `(n_dof, states)`."""
         ...
 

@@ -286,7 +286,7 @@ class IterativeSystem:
             for k, s in sorted(solved.items())
         ]
 
-    def condensed(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
+    def condense(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows see it; see `Engine`. A solve for each row."""
         opened = self.solve(f, u_imposed)
         F = np.empty((N.shape[0], N.shape[0]))

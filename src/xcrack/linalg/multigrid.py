@@ -22,7 +22,7 @@ from xcrack.base.optional import require_package
 from xcrack.fem.assembly import Bulk, bulk, rigid_modes
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.linalg.basis import stars
-from xcrack.linalg.products import BorderedFactor, RowBlocks, in_fours, stored
+from xcrack.linalg.products import BorderedFactor, RowBlocks, in_fours, store_blocks
 from xcrack.mesh.simplex import node_points
 
 _COARSEST = 300  # unknowns below which a dense inverse ends the hierarchy
@@ -369,7 +369,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     A, d = bulk.matrix, bulk.mesh.dim
     fixed = np.array(fixed[: A.shape[0]], dtype=bool)
     free, diagonal = ~fixed, _diagonal(A)
-    finest = stored(A, np.float64)
+    finest = store_blocks(A, np.float64)
     if fixed.any():
         finest = replace(finest, idle=lock(np.nonzero(fixed)[0]))
     if bulk.order == 2:
@@ -398,7 +398,7 @@ def _aggregation_levels(
     """
     levels: list[GridLevel] = []
     while A.shape[0] > _COARSEST or not levels:
-        blocks = stored(A) if levels else finest.single()
+        blocks = store_blocks(A) if levels else finest.single()
         diagonal = _diagonal(A)
         largest = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(A, diagonal, largest, candidates, alone, blocks.idle)
@@ -488,7 +488,7 @@ def _diagonal(A: sp.bsr_matrix) -> Floats:
 def _level(blocks: RowBlocks, diagonal: Floats, largest: float, P: sp.bsr_matrix) -> GridLevel:
     R = sp.bsr_matrix(P.T, blocksize=P.blocksize[::-1])
     inverse = lock(reciprocal(diagonal).astype(np.float32))
-    return GridLevel(blocks, inverse, largest, stored(P), stored(R))
+    return GridLevel(blocks, inverse, largest, store_blocks(P), store_blocks(R))
 
 
 def _prolongator(

@@ -208,7 +208,7 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
     return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
 
 
-def stored(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
+def store_blocks(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
     """Store a matrix of blocks: a block of its rows is one of ours.
 
     Blocks of three rows, or multiples of it, are taken as they are, without a matrix in between;

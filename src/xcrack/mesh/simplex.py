@@ -70,7 +70,7 @@ def gauss(n: int) -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=64)
-def conical(dim: int, n: int) -> tuple[Floats, Floats]:
+def conical_rule(dim: int, n: int) -> tuple[Floats, Floats]:
     """Conical product rule of degree 2 n - 1: points `(n^d, d + 1)`, weights summing to 1.
 
     Stroud (1971), Approximate Calculation of Multiple Integrals, conical products.
@@ -170,7 +170,7 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     for degree_of_rule in _RULES.get(dim, {}):
         if degree <= degree_of_rule:
             return _symmetric_points(dim, degree_of_rule)
-    return conical(dim, degree // 2 + 1)
+    return conical_rule(dim, degree // 2 + 1)
 
 
 # Sizes of cells.

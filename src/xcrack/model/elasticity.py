@@ -453,7 +453,8 @@ def _set_numbers(mesh: Mesh, names: list[str]) -> Ints:
     if bare.any():
         raise ProblemError(
             f"material: {int(bare.sum())} cells, one at "
-            f"{_cell_middle(mesh, int(np.argmax(bare)))}, are in none of the sets {', '.join(map(repr, names))}: give every cell a material."
+            f"{_cell_middle(mesh, int(np.argmax(bare)))}, are in none of the sets "
+            f"{', '.join(map(repr, names))}: give every cell a material."
         )
     return lock(number)
 

@@ -15,7 +15,7 @@ from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.load_program import Curve, K_over_size, LoadProgram, load_over_size
-from xcrack.fatigue.spectrum import Spectrum, distinct
+from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.levels import LevelTable
 from xcrack.growth.rates import pairs_of_states
 from xcrack.growth.step import Step, moved_places, numbers_after
@@ -50,7 +50,7 @@ class SpectrumBlock:
     @property
     def values(self) -> Floats:
         """Pairs of factors that differ `(p, 2)`."""
-        return distinct(self.spectrum.cycles)[0]
+        return distinct_cycles(self.spectrum.cycles)[0]
 
     def is_solved(self, step: Step) -> bool:
         """Whether K of each factor was solved, or is in proportion to one that was."""
@@ -65,7 +65,7 @@ class SpectrumBlock:
             pairs = pairs_of_states(K, self.spectrum, self.nu)
             ends, count = pairs.K, pairs.count
         else:
-            values, count, _ = distinct(self.spectrum.cycles)
+            values, count, _ = distinct_cycles(self.spectrum.cycles)
             ladder = self._ladder(step, K)
             ends = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
             count = np.repeat(count[:, None], K.shape[1], axis=1)

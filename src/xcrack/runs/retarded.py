@@ -20,7 +20,7 @@ from xcrack.fatigue.retardation import (
     march,
     no_zones,
 )
-from xcrack.fatigue.spectrum import Spectrum, distinct
+from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.levels import LevelTable
 from xcrack.growth.step import Step
 from xcrack.growth.uncertainty import best_K
@@ -154,7 +154,7 @@ class CycledPath:
                 "retarded: several tips grow in this history: retardation along a stored path is "
                 "for one tip, whose path does not depend on its rate."
             )
-        values, _, order = distinct(spectrum.cycles)
+        values, _, order = distinct_cycles(spectrum.cycles)
         ends = [
             _ends(rows, row, (history.steps[n], history.steps[n + 1]), values, spectrum, nu)
             for row, n in enumerate(rows.step.tolist())

@@ -25,7 +25,7 @@ from xcrack.sif.accuracy import BESIDE
 from xcrack.sif.domain_2d import domain_of
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.goal_2d import on_faces, tip_goal
-from xcrack.sif.sif import SIF, KErrors, bars_of, joined, no_bars
+from xcrack.sif.sif import SIF, KErrors, bars_of, joined_sif, no_bars
 
 # Estimated errors of K at tips of solutions of order 2 in 2D.
 
@@ -428,7 +428,7 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
     finer = solve_states(problem, [s.state for s in solutions])
     fronts = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
     by_front = [front_intensity(finer, t) for t in fronts]
-    every = [joined([states[k] for states in by_front], 3) for k in range(len(finer))]
+    every = [joined_sif([states[k] for states in by_front], 3) for k in range(len(finer))]
     reason = "order 2 has other fronts than order 1: refine the mesh along them"
     return bars_beside(sifs, every, reason)
 
@@ -558,7 +558,7 @@ def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
         return [no_bars(sif.K.shape, f"no finer mesh to compare with: {error}") for sif in sifs]
     fronts = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
     by_front = [front_intensity(finer, t) for t in fronts]
-    every = [joined([states[k] for states in by_front], 3) for k in range(len(finer))]
+    every = [joined_sif([states[k] for states in by_front], 3) for k in range(len(finer))]
     return bars_beside(sifs, every, "the finer mesh has other fronts: refine the mesh along them")
 
 

@@ -319,7 +319,7 @@ class SIF:
         return f", best = [{', '.join(f'({row})' for row in rows)}]"
 
 
-def joined(parts: Sequence[SIF], dim: int) -> SIF:
+def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
     """K of all tips or fronts of one crack.
 
     Parameters

@@ -15,7 +15,7 @@ from xcrack.model.material import Material
 from xcrack.sif.domain_2d import tip_intensities
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.error import with_bars
-from xcrack.sif.sif import SIF, joined
+from xcrack.sif.sif import SIF, joined_sif
 
 
 def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | None = None) -> SIF:
@@ -112,7 +112,7 @@ def stress_intensities(
             if space.dim < 3
             else [front_intensity(live, t) for t in ends]
         )
-    by_state = [joined([states[k] for states in by_end], space.dim) for k in range(len(live))]
+    by_state = [joined_sif([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)
     empty_sif = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
