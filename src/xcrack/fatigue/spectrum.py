@@ -251,4 +251,4 @@ def distinct_cycles(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
     return values, count, which.astype(np.int64)
 
 
-__all__ = ["BlockName", "Spectrum", "distinct"]
+__all__ = ["BlockName", "Spectrum", "distinct_cycles"]
