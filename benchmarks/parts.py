@@ -75,7 +75,7 @@ def run(n: int) -> None:
     with part("loads"):
         vectors = [load_vector(V, body, load, lips) for load in problem.loads]
         f = np.sum(vectors, axis=0)[:, None]
-        fixed = known_unknowns(V, ()).fixed.copy()
+        fixed = known_unknowns(V, ()).is_fixed.copy()
         fixed[free_motion(V, fixed).pins] = True
     with part("factor"):
         engine = linear.system(V, K, fixed, numerics)

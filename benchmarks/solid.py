@@ -91,9 +91,18 @@ def measure(n: int) -> dict[str, object]:
     beside = next_to_enriched(where)
     known = known_unknowns(where, ())
     model = System(where, lips, plain, enriched, known, n_points)
-    motion = timed("set-up", free_motion, where, known.fixed)
+    motion = timed("set-up", free_motion, where, known.is_fixed)
     engine = timed(
-        "set-up", iterative_system, where, K, plain, known.fixed, None, motion.modes, None, beside
+        "set-up",
+        iterative_system,
+        where,
+        K,
+        plain,
+        known.is_fixed,
+        None,
+        motion.modes,
+        None,
+        beside,
     )
     vectors = [
         sum(load_vector(where, problem.elasticity, x, lips) for x in s) for s in STATES.values()

@@ -240,10 +240,10 @@ def test_a_stiff_penalty_oscillates():
 def closed_condition(problem):
     """Condition number of the matrix that is factored with all lips closed, unit diagonal."""
     model = build(problem)
-    fixed = model.known.fixed.copy()
+    fixed = model.known.is_fixed.copy()
     fixed[free_motion(model.space, fixed).pins] = True
     engine = system(model.space, model.stiffness, fixed, problem.numerics)
-    A = engine.reduced
+    A = engine.basis_matrix
     method = problem.numerics.contact_method
     if method is not None:
         rows = method.rows(problem, model, method.pressure_space(problem, model, 0))

@@ -261,7 +261,7 @@ def test_energy_balances():
 def check_conditions(problem, solutions):
     """Coulomb's conditions at the points of the faces, and weak gaps, in every state."""
     mu, model = problem.friction, build(problem)
-    fixed, lips = model.known.fixed, model.lips[0]
+    fixed, lips = model.known.is_fixed, model.lips[0]
     space = multipliers(model.space, 0, lips, "reduced", fixed, rubs=True)
     rows = gap_rows(space, lips, model.jumps[0])
     for solution in solutions:

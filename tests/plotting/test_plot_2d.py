@@ -135,7 +135,7 @@ def test_values_are_those_of_the_solution(pulled, field):
 def test_stress_at_a_tip_is_clipped_and_the_bar_says_so(pulled):
     picture = scene(pulled, "von_mises", 0.0, None)
     assert picture.limits[1] < 0.5 * picture.values.max()
-    assert picture.beyond == (False, True)
+    assert picture.is_beyond == (False, True)
     share = float(picture.label.split("clipped at ")[1].removesuffix(" %"))
     assert 99 <= share < 100
     own = scene(pulled, "von_mises", 0.0, (0.0, 2.0))
@@ -146,16 +146,16 @@ def test_stress_at_a_tip_is_clipped_and_the_bar_says_so(pulled):
 def test_without_tips_nothing_is_clipped():
     picture = scene(solved(cracks=False), "syy", 0.0, None)
     assert picture.label == "stress yy"
-    assert picture.beyond == (False, False)
+    assert picture.is_beyond == (False, False)
     # Constant stress 1: noise is not spread over the colours.
     assert picture.limits == pytest.approx((0.95, 1.05), rel=1e-6)
 
 
 def test_colours_part_at_zero_for_both_signs(pulled):
     picture = scene(pulled, "uy", 0.0, None)
-    assert picture.signed
+    assert picture.has_sign
     assert picture.limits[0] == -picture.limits[1]
-    assert not scene(pulled, "displacement", 0.0, None).signed
+    assert not scene(pulled, "displacement", 0.0, None).has_sign
 
 
 # --- files and figures --------------------------------------------------------------------------

@@ -126,8 +126,8 @@ def test_the_crack_opens_with_the_warp(solution):
     rest, moved = (space_scene(solution, "uz", w, None, None, None) for w in (0.0, warp))
     shift = np.abs(moved.triangles - rest.triangles)[..., 2]
     np.testing.assert_allclose(shift, warp * np.abs(rest.values), atol=1e-12)
-    assert len(rest.faint) == 0
-    assert length(moved.faint) == pytest.approx(24, rel=1e-10)
+    assert len(rest.faint_lines) == 0
+    assert length(moved.faint_lines) == pytest.approx(24, rel=1e-10)
 
 
 @pytest.mark.parametrize("field", SPACE_FIELDS)
@@ -165,7 +165,7 @@ def test_closed_lips_look_unlike_open_ones(solution):
     """Bending about x: open where y > 0, and beyond by a cell."""
     pressed = crack_scene(solution, "pressure", [0], 0.0, None, None, None)
     total = 2 * (1 + TIP)
-    assert area(pressed.triangles) + area(pressed.apart) == pytest.approx(total, rel=1e-10)
+    assert area(pressed.triangles) + area(pressed.open_faces) == pytest.approx(total, rel=1e-10)
     assert pressed.triangles.mean(axis=1)[:, 1].max() < 0.34
     # Linear pressures: their integral over the triangles is the force between the crack faces.
     contact = solution.contact[0]
@@ -176,15 +176,15 @@ def test_closed_lips_look_unlike_open_ones(solution):
     opened = crack_scene(solution, "opening", [0], 0.0, None, None, None)
     closed = contact.measure[contact.closed].sum()
     # Half of a triangle or more counts: as wide as a triangle.
-    assert area(opened.touching) == pytest.approx(closed, rel=0.3)
-    assert area(opened.touching) + area(opened.triangles) == pytest.approx(total, rel=1e-10)
+    assert area(opened.closed_faces) == pytest.approx(closed, rel=0.3)
+    assert area(opened.closed_faces) + area(opened.triangles) == pytest.approx(total, rel=1e-10)
     assert opened.limits[0] == 0
     slid = crack_scene(solution, "sliding", [0], 0.0, None, None, None)
     assert area(slid.triangles) == pytest.approx(total, rel=1e-10)
     assert length(slid.fronts) == pytest.approx(2, rel=1e-10)
     assert area(slid.skin) == pytest.approx(24, rel=1e-12)
     # Seen from a side on which the crack shows its face.
-    assert abs(slid.toward[2]) > 0.5
+    assert abs(slid.view_direction[2]) > 0.5
 
 
 def test_mesh_and_enriched_points(solution):
@@ -192,7 +192,7 @@ def test_mesh_and_enriched_points(solution):
     space = solution.space
     assert len(picture.heaviside) == (space.heaviside[0] >= 0).sum()
     assert len(picture.tip) == (space.tips[0].point_to_function >= 0).sum()
-    assert area(picture.touching) == pytest.approx(2 * (1 + TIP), rel=1e-10)
+    assert area(picture.closed_faces) == pytest.approx(2 * (1 + TIP), rel=1e-10)
 
 
 def test_arrows_of_loads():

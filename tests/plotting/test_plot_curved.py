@@ -92,7 +92,7 @@ def test_a_hole_in_space_is_drawn_round():
     cut = space_scene(solution, "uz", 0.0, None, (np.zeros(3), np.array([0.0, -1.0, 0.0])), None)
     assert off_circle(cut.outline).max() < SEEN + 1e-9
     edges = mesh_scene(solution, None, None)
-    assert off_circle(edges.faint).max() < SEEN
+    assert off_circle(edges.faint_lines).max() < SEEN
     assert off_circle(edges.outline).max() < SEEN
     plane = given_plane(((0, 0, 0.5), ((1, 0, 0), (0, 1, 0))))
     assert off_circle(section_outline(solution.space.mesh, plane)).max() < SEEN

@@ -72,7 +72,7 @@ SCENES = {
 def matrix_of(problem):
     """Matrix that is factored, and the columns that it belongs to."""
     model = build(problem)
-    fixed = model.known.fixed.copy()
+    fixed = model.known.is_fixed.copy()
     fixed[free_motion(model.space, fixed).pins] = True
     basis, reduced = direct._reduced_columns(
         model.space, model.stiffness, fixed, problem.numerics, problem.material
@@ -229,7 +229,7 @@ def test_only_what_changed_is_factored_and_the_bits_are_the_same(order, monkeypa
         assert after.solve(b).tobytes() == alone.solve(b).tobytes()
         if before is not None:
             shares.append(seen["wanted"].mean())
-        assert sum(map(len, after.memory)) <= multifrontal._SPREAD * after.used
+        assert sum(map(len, after.memory)) <= multifrontal._SPREAD * after.n_numbers
         before = after
     assert max(shares) < 0.7
     again = factorise(A, columns, halves, before, keep=True)
@@ -260,11 +260,11 @@ def test_memory_of_update_matrices_is_bounded(monkeypatch):
     halves = tree(problem.mesh, 2)
     free = factorise(A, columns, halves, keep=True)
     once = factorise(A, columns, halves)
-    retained = free.used - once.used
+    retained = free.n_numbers - once.n_numbers
     monkeypatch.setattr(multifrontal, "_MOST", retained // 3)
     bound = factorise(A, columns, halves, keep=True)
-    assert bound.lowest > free.lowest
-    assert bound.used - once.used <= retained // 3
+    assert bound.subtree_levels > free.subtree_levels
+    assert bound.n_numbers - once.n_numbers <= retained // 3
     b = np.ones(A.shape[0])
     assert bound.solve(b).tobytes() == free.solve(b).tobytes()
     # A factor with other units is not taken over, and one of another tree neither.

@@ -214,7 +214,7 @@ class Scene:
             loads=loads, order=order,
         )  # fmt: skip
         self.problem, self.model = problem, build(problem)
-        self.space, self.fixed = self.model.space, self.model.known.fixed
+        self.space, self.fixed = self.model.space, self.model.known.is_fixed
         self.f = total(problem, self.model, loads)
         self.known = self.model.known.value
         self.stiffness = problem.material.E * n / 2
@@ -325,7 +325,7 @@ def test_standard_block_is_that_of_the_uncracked_body():
     engine = scene.iterative()
     A = (engine.basis.T @ scene.model.stiffness @ engine.basis).tocsr()
     n = engine.hierarchy.matrix.shape[0]
-    x = np.random.default_rng(3137).normal(size=n) * engine.hierarchy.free
+    x = np.random.default_rng(3137).normal(size=n) * engine.hierarchy.is_free
     np.testing.assert_allclose(A[:n, :n] @ x, engine.hierarchy.matrix.times(x), atol=1e-13)
     # enriched unknowns of a node: orthonormal, orthogonal to its standard ones
     scale = engine.operator.diagonal[n:]
@@ -397,7 +397,7 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
     loads = [xc.traction("top", turning)] if supports else sides
     problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], supports, loads, order=order)
     model = build(problem)
-    space, fixed = model.space, model.known.fixed
+    space, fixed = model.space, model.known.is_fixed
     motion = free_motion(space, fixed)
     f = total(problem, model, loads)
     f = balanced_loads(space, motion, f[:, None])[0][:, 0]

@@ -57,7 +57,7 @@ def penny():
         [xc.fix("bottom")], [xc.traction("top", (0.3, 0.2, 1.0))], contact="off", order=2,
     )  # fmt: skip
     model = build(problem)
-    return model, iterative_system(model.space, model.stiffness, model.bulk, model.known.fixed)
+    return model, iterative_system(model.space, model.stiffness, model.bulk, model.known.is_fixed)
 
 
 def test_stars_hold_what_ends_around_a_point(penny):
@@ -77,7 +77,7 @@ def test_stars_hold_what_ends_around_a_point(penny):
 
 def test_tip_functions_apart_from_their_star_couple_with_no_more(penny):
     model, _ = penny
-    K, free = model.stiffness, ~model.known.fixed
+    K, free = model.stiffness, ~model.known.is_fixed
     T = patch_orthogonal(model.space, K, free, "star")
     n = model.space.n_dof
     back = 2 * sp.identity(n) - T
@@ -97,7 +97,7 @@ def test_the_bound_of_the_spectrum(penny):
     n = len(engine.operator.diagonal)
     A = (engine.basis.T @ engine.matrix @ engine.basis).toarray()
     supported = ~np.concatenate(
-        [engine.hierarchy.free, np.ones(n - len(engine.hierarchy.free), bool)]
+        [engine.hierarchy.is_free, np.ones(n - len(engine.hierarchy.is_free), bool)]
     )
     A[supported, supported] = engine.operator.diagonal[supported]
     B = np.stack([top.patches.times(column) for column in np.eye(n, dtype=np.float32)], axis=1)
@@ -112,6 +112,6 @@ def test_the_bound_of_the_spectrum(penny):
 def test_coordinates_come_back(penny):
     _, engine = penny
     y = np.random.default_rng(7121).normal(size=len(engine.operator.diagonal))
-    y[: len(engine.hierarchy.free)] *= engine.hierarchy.free
+    y[: len(engine.hierarchy.is_free)] *= engine.hierarchy.is_free
     back = engine.coordinates(engine.basis @ y)
     assert np.abs(back - y).max() <= 1e-7  # round-off, times the root of the least kept energy

@@ -120,7 +120,7 @@ def _adaptation_passes(
         if len(rounds) == _MOST_ROUNDS[scene.mesh.dim]:
             reason = f"{len(rounds)} rounds have not been enough"
             break
-        if not current.best.any():
+        if not current.K.any():
             break  # at rest, or shut everywhere: no cell brings K, nor a scale for its error
         mesh = _NEXT[scene.mesh.dim](current, tolerance, aim, most)
         if mesh is None:
@@ -141,7 +141,7 @@ def _adaptation_passes(
         current = new
     for message in messages:
         warn(message)
-    zero = "" if np.abs(current.best).max(initial=0.0) > 0 else "K is zero at every tip"
+    zero = "" if np.abs(current.K).max(initial=0.0) > 0 else "K is zero at every tip"
     parts = [part for part in (reason, current.worst, *current.reasons, zero) if part]
     reason = "" if met else "; ".join(parts)
     return Adaptation(
@@ -159,7 +159,7 @@ def _measure_pass(
         new = _TRUSTED[scene.mesh.dim](indicators_of(scene, states), old)
     unknowns, seconds = new.solutions[0].space.n_dof, perf_counter() - start
     rounds.append(
-        AdaptationPass(len(scene.mesh.cells), unknowns, new.best, new.bar, new.scale, seconds)
+        AdaptationPass(len(scene.mesh.cells), unknowns, new.K, new.bar, new.scale, seconds)
     )
     return new, messages
 

@@ -28,22 +28,22 @@ class Indicators:
         Without their factor.
     sifs : tuple of tuple of SIF
         Of each state and crack.
-    best, bar : (k, 2 or 3) arrays, stress · √length
+    K, bar : (k, 2 or 3) arrays, stress · √length
         Of all tips, or places along fronts away from surfaces, of all cracks in all states but
         those at rest.
     shares : (2 k, cells) array, stress · √length
         Absolute contributions of the cells to K_I and K_II of each.
-    beside : tuple of float, length
+    surface_depths : tuple of float, length
         Of each crack: places of its fronts closer than this to a free surface do not count.
     """
 
     problem: Problem
     solutions: tuple[Solution, ...]
     sifs: tuple[tuple[SIF, ...], ...]
-    best: Floats
+    K: Floats
     bar: Floats
     shares: Floats
-    beside: tuple[float, ...]
+    surface_depths: tuple[float, ...]
 
     @property
     def error(self) -> float:
@@ -54,7 +54,7 @@ class Indicators:
     @property
     def scale(self) -> float:
         """What errors of all K are compared with, stress · √length."""
-        return self.scale_of(self.best)
+        return self.scale_of(self.K)
 
     def scale_of(self, best: Floats) -> float:
         """The largest of some best K, or where that is next to nothing a share of K by the energy.
@@ -74,7 +74,7 @@ class Indicators:
         """Where bars are longest, in words; empty where there is no bar."""
         for k in live_states(self):
             for c, sif in enumerate(self.sifs[k]):
-                if len(sif.K) and not counted_places(sif, self.beside[c]).any():
+                if len(sif.K) and not counted_places(sif, self.surface_depths[c]).any():
                     return f"no place of crack {c} is away from free surfaces: its fronts are short"
         ends = [
             (
@@ -84,7 +84,7 @@ class Indicators:
             )
             for k in live_states(self)
             for c, sif in enumerate(self.sifs[k])
-            for is_counted in [counted_places(sif, self.beside[c])]
+            for is_counted in [counted_places(sif, self.surface_depths[c])]
             if np.isfinite(sif.bar[is_counted]).all() and is_counted.any()
         ]
         if not ends:

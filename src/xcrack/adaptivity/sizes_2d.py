@@ -142,7 +142,7 @@ def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
     """
     if old is None:
         return new
-    change = np.abs(new.best - old.best)
+    change = np.abs(new.K - old.K)
     bent = np.repeat(np.isin(_cracks(new), _bent_cracks(new)), _ends(new))[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         growth = change / np.where(bent, new.bar, new.bar + old.bar)

@@ -89,7 +89,7 @@ def error_of(given: Indicators, c: int) -> float:
     bars = [np.zeros(1)]
     for k in live_states(given):
         sif = given.sifs[k][c]
-        bars_of_crack = sif.bar[counted_places(sif, given.beside[c])]
+        bars_of_crack = sif.bar[counted_places(sif, given.surface_depths[c])]
         bars.append(
             bars_of_crack.max(axis=1)
             if len(bars_of_crack) or not len(sif.K)
@@ -111,7 +111,7 @@ def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
     live = live_states(new)
     if old is None:
         sifs = tuple(tuple(map(_lengthen_errors, state)) for state in new.sifs)
-        return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
+        return replace(new, sifs=sifs, bar=values(sifs, live, new.surface_depths)[1])
     finer = [
         _sizes_at(old, c) >= _SMALLER * _sizes_at(new, c) for c in range(len(new.problem.cracks))
     ]
@@ -122,7 +122,7 @@ def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
         )
         for k, (state, states_before) in enumerate(zip(new.sifs, old.sifs, strict=True))
     )
-    return replace(new, sifs=sifs, bar=values(sifs, live, new.beside)[1])
+    return replace(new, sifs=sifs, bar=values(sifs, live, new.surface_depths)[1])
 
 
 def _lengthen_errors(sif: SIF) -> SIF:

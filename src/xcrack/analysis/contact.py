@@ -263,7 +263,7 @@ def _overlapping_cracks(
         if (gap.min(axis=0) >= limit).all():
             continue
         trial = multipliers(
-            model.space, c, lips, problem.numerics.multipliers, model.known.fixed,
+            model.space, c, lips, problem.numerics.multipliers, model.known.is_fixed,
             material=material_numbers(problem),
         )  # fmt: skip
         weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
@@ -278,7 +278,7 @@ def _space(problem: Problem, model: System, c: int) -> Multipliers:
     if method is not None:
         return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
-    fixed, rub = model.known.fixed, has_friction(problem, c)
+    fixed, rub = model.known.is_fixed, has_friction(problem, c)
     return multipliers(model.space, c, model.lips[c], kind, fixed, rub, material_numbers(problem))
 
 

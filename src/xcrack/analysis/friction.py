@@ -447,7 +447,7 @@ def solve_friction(
     """
     faces = [_face(problem, model, m) for m in chosen]
     rubbing = [face for face in faces if face.mu > 0]
-    along = [face.along[k] for k in range(model.space.dim - 1) for face in rubbing]
+    along = [face.slip_rows[k] for k in range(model.space.dim - 1) for face in rubbing]
     N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
     small = engine.condense(N, f, u_imposed)
     rows = _rows(faces, small.dual, stiffness)
@@ -498,7 +498,7 @@ class _Face:
     normal: sp.csr_matrix
     tangents: Floats
     jumps: list[sp.csr_matrix]
-    along: list[sp.csr_matrix]
+    slip_rows: list[sp.csr_matrix]
 
 
 def _face(problem: Problem, model: System, m: Multipliers) -> _Face:

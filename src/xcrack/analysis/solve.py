@@ -76,7 +76,7 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     stored = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *where))
     if stored <= 0:
         return None
-    free = ~model.known.fixed[:n]
+    free = ~model.known.is_fixed[:n]
     vector = sum(load_vector(space, elasticity, load, ())[:n] for load in stresses)
     f = np.where(free, vector, 0.0)
     matrix = model.bulk.matrix
@@ -187,7 +187,7 @@ def _solve_states(
     model = build(problem, old)
     vectors = mesh_loads(model.space, model.bulk.loads)
     cases = [_case(problem, model, state, vectors) for state in states]
-    fixed = model.known.fixed.copy()
+    fixed = model.known.is_fixed.copy()
     free = _fixed_unknowns(model, fixed)
     motion = free_motion(model.space, fixed, free[1])
     engine = _engine(problem, model, fixed, motion, solver, reuse)
@@ -306,7 +306,7 @@ def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats
     moved = [(load, factor) for load, factor in acting if "support" in load.acts]
     for factor in sorted({factor for _, factor in moved}):
         new = known_unknowns(model.space, [cast(Support, x) for x, f in moved if f == factor])
-        u_imposed = np.where(new.fixed & model.known.fixed, factor * new.value, u_imposed)
+        u_imposed = np.where(new.is_fixed & model.known.is_fixed, factor * new.value, u_imposed)
     largest = max(np.abs(f).max(initial=0.0), np.abs(u_imposed).max(initial=0.0))
     if not largest < _LARGEST:
         raise ProblemError(

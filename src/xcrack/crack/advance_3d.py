@@ -122,7 +122,7 @@ def advance_fronts(
     lines: list[Ints] = []
     strips: list[tuple[int, AdvanceStrip]] = []
     for (members, _), old, rays in zip(chains, wholes, sent):
-        if rays is None or rays[0].still.all():
+        if rays is None or rays[0].is_at_rest.all():
             lines.extend((crack.fronts or ())[k] for k in members)
             continue
         path = float(np.linalg.norm(rays[0].stop - rays[0].start, axis=1).max())
@@ -242,7 +242,7 @@ def _joined_strip(
     they are taken back; where points that have run into each other do so, these are merged.
     Outside the body nothing depends on it.
     """
-    pinned = rays.pinned[rays.owner]
+    pinned = rays.is_pinned[rays.owner]
     needed = np.zeros(len(rays.owner), dtype=bool)
     while True:
         trial = _cleared_front(_pinned_front(front, pinned | needed), size)
@@ -276,7 +276,7 @@ def _pinned_front(front: FrontChain, rays: Bools) -> FrontChain:
     """A front of which those points are pinned that one of the given rays has become."""
     pinned = np.zeros(len(front.x), dtype=bool)
     pinned[front.owner[rays]] = True
-    return replace(front, pinned=pinned)
+    return replace(front, is_pinned=pinned)
 
 
 def _cleared_front(front: FrontChain, size: float) -> FrontChain:
@@ -381,9 +381,9 @@ def _stitched_strip(
     own_number = np.full(n, -1)
     ray_to_vertex = np.full(n_rays, -1)
     ray_to_vertex[vertex] = np.arange(len(vertex))
-    still = np.nonzero(front.still)[0]
+    still = np.nonzero(front.is_at_rest)[0]
     own_number[front.owner[still]] = old.number[ray_to_vertex[still]]
-    inner = division_points(front.x, front.closed, pieces, own_number >= 0)
+    inner = division_points(front.x, front.is_closed, pieces, own_number >= 0)
     points: list[Floats] = []
     line: list[int] = []
     begin = np.zeros(n, dtype=np.int64)
@@ -401,12 +401,12 @@ def _stitched_strip(
             line.append(count)
             count += 1
         points.extend(new)
-    if front.closed:
+    if front.is_closed:
         line.append(line[0])
     end = np.append(begin[1:], len(line) - 1)
     faces: list[tuple[int, int, int]] = []
     turned_sides: list[int] = []
-    n_sides = len(vertex) if front.closed else len(vertex) - 1
+    n_sides = len(vertex) if front.is_closed else len(vertex) - 1
     for j in range(n_sides):
         first, last = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
         last += n_rays if last <= first else 0
@@ -429,8 +429,8 @@ def _stitched_strip(
         np.array(points).reshape(-1, 3),
         np.array(faces, dtype=np.int64).reshape(-1, 3),
         np.array(line),
-        front.start[~front.still],
-        front.stop[~front.still],
+        front.start[~front.is_at_rest],
+        front.stop[~front.is_at_rest],
     )
     return strip, np.array(turned_sides, dtype=np.int64)
 

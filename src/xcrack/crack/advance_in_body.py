@@ -91,12 +91,12 @@ def rays_in_body(
 
 def _still_at_vertices(front: FrontChain, vertex: Ints) -> FrontChain:
     """A front on which points within its old sides that do not move fall on vertices beside."""
-    between = front.still & ~np.isin(np.arange(len(front.still)), vertex)
+    between = front.is_at_rest & ~np.isin(np.arange(len(front.is_at_rest)), vertex)
     if not between.any():
         return front
     rows = np.nonzero(between)[0]
     beside = vertex[np.searchsorted(vertex, rows) - 1]
-    owner, still, stop = np.array(front.owner), np.array(front.still), np.array(front.stop)
+    owner, still, stop = np.array(front.owner), np.array(front.is_at_rest), np.array(front.stop)
     remains = np.ones(len(front.x), dtype=bool)
     remains[owner[rows]] = False
     owner[rows] = owner[beside]
@@ -105,9 +105,9 @@ def _still_at_vertices(front: FrontChain, vertex: Ints) -> FrontChain:
     return replace(
         front,
         x=front.x[remains],
-        pinned=front.pinned[remains],
+        is_pinned=front.is_pinned[remains],
         owner=number[owner],
-        still=still,
+        is_at_rest=still,
         stop=stop,
     )
 
@@ -143,9 +143,12 @@ def _short_ways(front: FrontChain, share: Floats, size: float) -> FrontChain:
     if not (share < 1).any():
         return front
     move = share[:, None] * (front.stop - front.start)
-    stays = front.still | ((share < 1) & (np.linalg.norm(move, axis=1) < _LEAST * size))
+    stays = front.is_at_rest | ((share < 1) & (np.linalg.norm(move, axis=1) < _LEAST * size))
     return chain(
-        front.start, np.where(stays[:, None], front.start, front.start + move), stays, front.closed
+        front.start,
+        np.where(stays[:, None], front.start, front.start + move),
+        stays,
+        front.is_closed,
     )
 
 
@@ -157,7 +160,7 @@ def _facing_parts(fronts: Sequence[FrontChain | None]) -> Iterator[tuple[int, In
                 continue
             if i != j:
                 yield i, np.arange(len(one.x)), j, np.arange(len(other.x))
-            elif not one.closed and len(one.x) > 3:
+            elif not one.is_closed and len(one.x) > 3:
                 s = np.cumsum(np.linalg.norm(one.start[1:] - one.start[:-1], axis=1))
                 first, last = (int(np.searchsorted(s, part * s[-1] / 3)) + 1 for part in (1, 2))
                 yield i, np.arange(first), i, np.arange(last, len(one.x))
@@ -207,7 +210,7 @@ class _FrontEnd:
     front : int
     base : int
         Its ray from which it goes on, the first outside or the last in the body.
-    inside : bool
+    is_inside : bool
         Whether the base lies in the body.
     path : (k, 3) array, length
         Where it goes on, from the base; without room one point.
@@ -215,7 +218,7 @@ class _FrontEnd:
 
     front: int
     base: int
-    inside: bool
+    is_inside: bool
     path: Floats
 
 
@@ -269,13 +272,13 @@ def _gaps(
     if before.all() or not (before & after).any():
         return []
     result = []
-    for run in runs_of(~before) if front.closed else open_runs(~before):
+    for run in runs_of(~before) if front.is_closed else open_runs(~before):
         sides = []
         for reverse in (False, True):
             row = run[::-1] if reverse else run
             step = -1 if reverse else 1
             back = row[0] - step * np.arange(1, n)
-            back = back % n if front.closed else back[(back >= 0) & (back < n)]
+            back = back % n if front.is_closed else back[(back >= 0) & (back < n)]
             # As far back as the front lay in the body before.
             back = back[: int(np.argmin(before[back]))] if not before[back].all() else back
             order = np.concatenate([back[::-1], row])
@@ -369,7 +372,7 @@ def _led_on(
     if not gaps:
         return front
     n = len(front.x)
-    stop, still, owner = np.array(front.stop), np.array(front.still), np.arange(n)
+    stop, still, owner = np.array(front.stop), np.array(front.is_at_rest), np.arange(n)
     outside = np.zeros(n, dtype=bool)
     for gap in gaps:
         first, last = (ends[k] if k >= 0 else None for k in gap.ends)
@@ -394,10 +397,12 @@ def _led_on(
         still[rays], outside[rays[bends]] = stays, True
     remains = owner == np.arange(n)
     pinned = (still | outside)[remains]
-    if not front.closed:
+    if not front.is_closed:
         pinned[[0, -1]] = True
     number = np.cumsum(remains) - 1
-    return FrontChain(stop[remains], front.closed, pinned, front.start, stop, still, number[owner])
+    return FrontChain(
+        stop[remains], front.is_closed, pinned, front.start, stop, still, number[owner]
+    )
 
 
 def _way_across(
@@ -418,7 +423,7 @@ def _way_across(
             s = _arc(np.concatenate([front.start[[end.base]], outwards]))
             way = _point_on_path(end.path, s[1:] / s[-1] * _arc(end.path)[-1])
             return (way if first is not None else way[::-1]), none
-        if end.inside:
+        if end.is_inside:
             return _up_to_other_walls(start, front.stop[rays], body), none
         return np.zeros((0, 3)), none
     link = np.linspace(0.0, 1.0, 4 * _SAMPLES + 1)[:, None] * (last.path[-1] - first.path[-1])

@@ -33,7 +33,7 @@ class TraceOutline:
 
     loop: Ints
     candidate: Bools
-    inside: Bools
+    is_inside: Bools
     first_time: bool
 
 
@@ -46,11 +46,11 @@ def open_fronts(
     depth, _ = body.depth(x)
     size = body.cell_size(x)
     outward, normal = _outward_directions(points, faces, loop)
-    runs = runs_of(outline.inside)
+    runs = runs_of(outline.is_inside)
     movable = outline.candidate | np.roll(outline.candidate, 1)
     before: dict[int, Ints] = {}
     after: dict[int, Ints] = {}
-    for mouth in runs_of(~outline.inside):
+    for mouth in runs_of(~outline.is_inside):
         vertex = np.append(mouth, (mouth[-1] + 1) % m) if runs else mouth
         offset = np.zeros((len(vertex), 3))
         inner = np.array(movable[vertex])
@@ -164,7 +164,7 @@ def behind_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body)
     x = points[outline.loop]
     outward, normal = _outward_directions(points, faces, outline.loop)
     depth, size = body.depth((x + np.roll(x, -1, axis=0)) / 2)
-    for run in runs_of(~outline.inside):
+    for run in runs_of(~outline.is_inside):
         if outline.candidate[run].all() and (depth[run] <= ON * size[run]).all():
             k = run[np.argmax(depth[run])]
             result[run] = is_at_hole(x[k], -outward[k], normal[k], body)

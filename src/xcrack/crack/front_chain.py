@@ -20,25 +20,25 @@ class FrontChain:
     ----------
     x : (g, 3) array, length
         In the direction of the front.
-    closed : bool
-    pinned : (g,) array of bool
+    is_closed : bool
+    is_pinned : (g,) array of bool
         Points that stay where they are: those that do not advance, and the ends of open fronts.
     start : (r, 3) array, length
         Points that were sent out, on the old front.
     stop : (r, 3) array, length
         Where these arrived.
-    still : (r,) array of bool
+    is_at_rest : (r,) array of bool
         Which of these did not advance; they keep their point number.
     owner : (r,) array of int
         The point of the new front that each of them became.
     """
 
     x: Floats
-    closed: bool
-    pinned: Bools
+    is_closed: bool
+    is_pinned: Bools
     start: Floats
     stop: Floats
-    still: Bools
+    is_at_rest: Bools
     owner: Ints
 
     def __post_init__(self) -> None:
@@ -48,18 +48,18 @@ class FrontChain:
     @property
     def side(self) -> Floats:
         """Vectors from each point to the next one."""
-        return steps(self.x, self.closed)
+        return steps(self.x, self.is_closed)
 
     @property
     def old_side(self) -> Floats:
         """Where each side comes from: between the middles of what its ends were."""
         first, last = self.members()
-        return steps((self.start[first] + self.start[last]) / 2, self.closed)
+        return steps((self.start[first] + self.start[last]) / 2, self.is_closed)
 
     def members(self) -> tuple[Ints, Ints]:
         """First and last of those that became each point, `(g,)` both."""
         changes = self.owner != np.roll(self.owner, 1)
-        changes[0] |= not self.closed
+        changes[0] |= not self.is_closed
         first = np.nonzero(changes)[0]
         if not len(first):
             first = np.zeros(1, dtype=np.int64)
@@ -70,7 +70,7 @@ class FrontChain:
     def fixed(self) -> Bools:
         """Sides that are part of the old front and remain."""
         still = np.zeros(len(self.x), dtype=bool)
-        still[self.owner[self.still]] = True
+        still[self.owner[self.is_at_rest]] = True
         following = np.roll(still, -1)
         return np.asarray((still & following)[: len(self.side)])
 
@@ -113,11 +113,11 @@ def merge_side(front: FrontChain, side: int, x: Floats) -> FrontChain:
     """
     n = len(front.x)
     one, other = side, (side + 1) % n
-    if front.pinned[one]:
+    if front.is_pinned[one]:
         x = front.x[one]
-    elif front.pinned[other]:
+    elif front.is_pinned[other]:
         x = front.x[other]
-    pinned = np.array(front.pinned)
+    pinned = np.array(front.is_pinned)
     pinned[one] |= pinned[other]
     points = np.array(front.x)
     points[one] = x
@@ -125,7 +125,7 @@ def merge_side(front: FrontChain, side: int, x: Floats) -> FrontChain:
     number[other] = one
     number[number > other] -= 1
     is_other = np.arange(n) != other
-    return replace(front, x=points[is_other], pinned=pinned[is_other], owner=number[front.owner])
+    return replace(front, x=points[is_other], is_pinned=pinned[is_other], owner=number[front.owner])
 
 
 def without_loops(front: FrontChain) -> FrontChain:
@@ -137,7 +137,7 @@ def without_loops(front: FrontChain) -> FrontChain:
     while len(front.x) > 2:
         side, before = front.side, front.old_side
         forward = np.einsum("ij,ij->i", side, before) / np.einsum("ij,ij->i", before, before)
-        pinned = front.pinned & np.roll(front.pinned, -1)
+        pinned = front.is_pinned & np.roll(front.is_pinned, -1)
         forward[pinned[: len(side)]] = np.inf
         worst = int(np.argmin(forward))
         if forward[worst] > 0:
@@ -157,7 +157,7 @@ def without_sides(front: FrontChain, sides: Ints) -> FrontChain:
     """A front in which the ends of the sides with these numbers are merged if one is free."""
     for side in sorted(set(sides.tolist()), reverse=True):
         other = (side + 1) % len(front.x)
-        if len(front.x) > 3 and not (front.pinned[side] and front.pinned[other]):
+        if len(front.x) > 3 and not (front.is_pinned[side] and front.is_pinned[other]):
             front = _join_side_ends(front, side)
     return front
 
@@ -184,7 +184,7 @@ def faired_front(front: FrontChain, passes: int) -> FrontChain:
     if n < 5 or length.min() <= 1e-6 * length.max():
         return front
     window = np.arange(n)[:, None] + np.arange(-2, 3)
-    if front.closed:
+    if front.is_closed:
         total = length.sum()
         s = np.concatenate([[0.0], np.cumsum(length[:-1])])
         place = s[window % n] + total * (window // n)
@@ -199,18 +199,18 @@ def faired_front(front: FrontChain, passes: int) -> FrontChain:
     weight *= (
         0.375 * 70 / 36 * weight[np.arange(n), own_column] / np.einsum("ij,ij->i", weight, weight)
     )[:, None]
-    along = tangents(front.x, front.closed)
+    along = tangents(front.x, front.is_closed)
     x = np.array(front.x)
     for _ in range(passes):
         move = -np.einsum("ij,ijk->ik", weight, x[window])
         move -= np.einsum("ij,ij->i", move, along)[:, None] * along
-        x[~front.pinned] += move[~front.pinned]
+        x[~front.is_pinned] += move[~front.is_pinned]
     advance = np.full(n, np.inf)
     np.minimum.at(advance, front.owner, np.linalg.norm(front.stop - front.start, axis=1))
     move, most = x - front.x, _PART * advance
     size = np.linalg.norm(move, axis=1)
     move *= (np.minimum(most, size) / np.where(size > 0, size, 1.0))[:, None]
-    return replace(front, x=np.where(front.pinned[:, None], front.x, front.x + move))
+    return replace(front, x=np.where(front.is_pinned[:, None], front.x, front.x + move))
 
 
 def spaced_front(front: FrontChain, least: float) -> FrontChain:
@@ -228,10 +228,10 @@ def spaced_front(front: FrontChain, least: float) -> FrontChain:
     """
     while True:
         n = len(front.x)
-        if n <= (_FEWEST if front.closed else 2):
+        if n <= (_FEWEST if front.is_closed else 2):
             return front
         length = np.linalg.norm(front.side, axis=1)
-        free = ~(front.pinned & np.roll(front.pinned, -1))[: len(length)]
+        free = ~(front.is_pinned & np.roll(front.is_pinned, -1))[: len(length)]
         tried = np.where(free, length, np.inf)
         side = int(np.argmin(tried))
         if tried[side] >= least:
@@ -247,14 +247,14 @@ def without_notches(front: FrontChain) -> FrontChain:
     n = len(front.x)
     side = front.side
     back = np.roll(side, 1, axis=0)
-    if not front.closed:
+    if not front.is_closed:
         back, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
     first, _ = front.members()
     ahead = front.stop[first] - front.start[first]
     hollow = np.einsum("ij,ij->i", side - back, ahead) > 0
     ahead_length, back_length = np.linalg.norm(side, axis=1), np.linalg.norm(back, axis=1)
     turn = np.einsum("ij,ij->i", side, back) / (ahead_length * back_length)
-    for i in np.nonzero(hollow & (turn < _NOTCH) & ~front.pinned)[0][::-1]:
+    for i in np.nonzero(hollow & (turn < _NOTCH) & ~front.is_pinned)[0][::-1]:
         if len(front.x) > 3:
             into = i if ahead_length[i] < back_length[i] else (i - 1) % n
             goal = (i + 1) % n if into == i else into

@@ -42,7 +42,7 @@ class Junction:
     x : (2,) array, length
     side : int
         Side of the other crack, +1 or -1, from which it comes.
-    beyond : (2,) array, length
+    prolongation_end : (2,) array, length
         Point on the other side up to which the level set of the crack is prolonged.
     reach : float, length
         Radius of the neighbourhood in which the crack is cut off by the other one.
@@ -53,7 +53,7 @@ class Junction:
     on: int
     x: Floats
     side: int
-    beyond: Floats
+    prolongation_end: Floats
     reach: float
 
 
@@ -273,10 +273,10 @@ def prolonged_cracks(cracks: tuple[Crack, ...], ends: tuple[Junction, ...]) -> t
         points, tips = crack.points, crack.tips or ()
         if end_of_crack.end == 0:
             points, tips = (
-                np.concatenate([end_of_crack.beyond[None], points]),
+                np.concatenate([end_of_crack.prolongation_end[None], points]),
                 tuple(t + 1 for t in tips),
             )
         else:
-            points = np.concatenate([points, end_of_crack.beyond[None]])
+            points = np.concatenate([points, end_of_crack.prolongation_end[None]])
         result[end_of_crack.crack] = polyline_crack(points, tips)
     return tuple(result)

@@ -92,16 +92,16 @@ class BodyBefore(Body):
 
     Attributes
     ----------
-    under : tuple of (TriangleTree, int)
+    crack_trees : tuple of (TriangleTree, int)
         Those cracks, and the side of each that counts.
     """
 
-    under: tuple[tuple[TriangleTree, int], ...] = ()
+    crack_trees: tuple[tuple[TriangleTree, int], ...] = ()
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
         """Distance to the boundary or to such a crack, negative inside, and the size there."""
         depth, size = super().depth(x)
-        for tree, side in self.under:
+        for tree, side in self.crack_trees:
             beyond = -side * signed_in(tree, x)[0]
             first = beyond > depth
             depth = np.where(first, beyond, depth)

@@ -73,7 +73,7 @@ def estimate(
     space = factored.model.space
     groups = groups_of(factored)
     dual = duals(factored, groups, goals)
-    w = surplus(space, factored.model.known.fixed)
+    w = surplus(space, factored.model.known.is_fixed)
     m = dual.z.shape[2]
     sets = np.unique(dual.which[[s.number for s in solutions]])
     columns = [np.stack([s.u for s in solutions], axis=1), *dual.z[sets]]

@@ -234,14 +234,14 @@ class ImposedValues:
 
     Attributes
     ----------
-    fixed : (n_dof,) array of bool
+    is_fixed : (n_dof,) array of bool
     value : (n_dof,) array, length
         Zero where nothing is imposed.
     owner : (n_dof,) array of int
         Number of the support that decides, -1 where none does.
     """
 
-    fixed: Bools
+    is_fixed: Bools
     value: Floats
     owner: Ints
 

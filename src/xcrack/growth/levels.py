@@ -37,19 +37,19 @@ class LevelTable:
     levels : (n,) array
         Rising.
     K : (n, f, 2 or 3) array, stress √length
-    smooth : bool
+    is_smooth : bool
         Between the levels a monotone cubic (Fritsch and Butland 1984), else straight lines.
     """
 
     levels: Floats
     K: Floats
-    smooth: bool
+    is_smooth: bool
 
     def at(self, factors: Floats) -> Floats:
         """K for some factors `(k,)`: `(k, f, 2 or 3)`; at a level the solved one, to the bit."""
         n = len(self.levels)
         left = np.clip(np.searchsorted(self.levels, factors, side="right") - 1, 0, n - 2)
-        if self.smooth and n > 2:
+        if self.is_smooth and n > 2:
             result = np.asarray(PchipInterpolator(self.levels, self.K, axis=0)(factors))
         else:
             share = (factors - self.levels[left]) / (self.levels[left + 1] - self.levels[left])
@@ -65,13 +65,13 @@ class LevelTable:
 class LevelResponse:
     """Response to one factor: a row of that to several, with the closed sets that these leave."""
 
-    whole: Response
+    response: Response
     row: int
 
     @property
     def sif(self) -> tuple[SIF, ...]:
         """K of each crack."""
-        return self.whole.sif[self.row]
+        return self.response.sif[self.row]
 
 
 def refined_response(
@@ -113,7 +113,7 @@ def refined_response(
     handed_on = solve_at([*first.tolist(), *earlier])
     levels = first.tolist()
     active = np.ones(len(levels) - 1, dtype=bool)
-    if not any(each.whole.may_bend for each in solved.values()):
+    if not any(each.response.may_bend for each in solved.values()):
         active[:] = False  # no crack has contact in any state: its gaps are lines over the factor
     ends = _ends(spectrum, low, high)
     while active.any() and len(levels) < _MOST:
@@ -126,9 +126,9 @@ def refined_response(
         active = np.array([a in bent or b in bent for a, b in zip(levels, levels[1:])])
     every = [solved[factor] for factor in sorted(solved)]
     return Response(
-        tuple(each.whole.states[each.row] for each in every),
+        tuple(each.response.states[each.row] for each in every),
         tuple(each.sif for each in every),
-        tuple(each.whole.solutions[each.row] for each in every if each.whole.solutions),
+        tuple(each.response.solutions[each.row] for each in every if each.response.solutions),
         replace(_with_nearest_sets(handed_on, solved, levels), levels=tuple(levels)),
     )
 
@@ -148,7 +148,7 @@ def _with_nearest_sets(
     near = [solved[float(known[np.abs(known - factor).argmin()])] for factor in factors]
     active: list[Bools | None] = []
     for c in range(len(reuse.centre)):
-        sets = [each.whole.reuse.active[c] for each in near]
+        sets = [each.response.reuse.active[c] for each in near]
         rows = [part[each.row] for part, each in zip(sets, near) if part is not None]
         active.append(np.stack(rows) if len(rows) == len(near) else None)
     centre = tuple(x if a is not None else None for x, a in zip(reuse.centre, active))
@@ -182,8 +182,8 @@ def _levels_that_matter(
     for K in solved_K:
         if K.shape[1] == 0:
             continue
-        before = LevelTable(np.array(levels), K[old], smooth=True)
-        after = LevelTable(np.array(more), K, smooth=True)
+        before = LevelTable(np.array(levels), K[old], is_smooth=True)
+        after = LevelTable(np.array(more), K, is_smooth=True)
         largest = max(float(np.abs(K).max()), np.finfo(float).tiny)
         error = np.abs(K[~old] - before.at(np.array(middle))).max(axis=2) / largest
         one, two = (_growths(ladder, factors, pairs, count) for ladder in (before, after))
@@ -255,9 +255,9 @@ def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[Le
         K = np.stack([state[c].K for state in sif])
         if origin:  # K is in proportion to the factor, on both sides with a slope of its own
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
-            result.append(LevelTable(np.array([factors[0], 0.0, factors[1]]), K, smooth=False))
+            result.append(LevelTable(np.array([factors[0], 0.0, factors[1]]), K, is_smooth=False))
         else:
-            result.append(LevelTable(factors, K, smooth=not linear))
+            result.append(LevelTable(factors, K, is_smooth=not linear))
     return result
 
 

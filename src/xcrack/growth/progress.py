@@ -117,9 +117,9 @@ _SEVERAL = re.compile(r"#(,? #)+")
 class WarningGroup:
     """What became of one kind of warning: messages alike but for their numbers."""
 
-    first: int
+    first_step: int
     steps: int
-    last: int
+    last_step: int
     message: str
 
 
@@ -145,9 +145,9 @@ class WarningLog:
     def _add(self, message: str, step: int) -> None:
         key = _SEVERAL.sub("#", _NUMBER.sub("#", message))
         kind = self.kinds.setdefault(key, WarningGroup(step, 1, step, message))
-        if kind.last != step:
-            self.kinds[key] = WarningGroup(kind.first, kind.steps + 1, step, message)
-        if kind.first == step:
+        if kind.last_step != step:
+            self.kinds[key] = WarningGroup(kind.first_step, kind.steps + 1, step, message)
+        if kind.first_step == step:
             warn(message)
 
     def summarise(self) -> None:
@@ -158,7 +158,7 @@ class WarningLog:
         if not again:
             return
         lines = [
-            f"in {kind.steps} of {self.n_steps} steps, from step {kind.first} to {kind.last}, "
+            f"in {kind.steps} of {self.n_steps} steps, from step {kind.first_step} to {kind.last_step}, "
             f"where it was: {kind.message}"
             for kind in again
         ]

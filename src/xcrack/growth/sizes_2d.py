@@ -50,7 +50,7 @@ def first_sizes(problem: Problem, stage: Stage) -> Floats:
 
 def error(now: Indicators) -> float:
     """Largest half-width of K over the largest K, of those that are known."""
-    scale = now.scale_of(now.best[np.isfinite(now.best)])
+    scale = now.scale_of(now.K[np.isfinite(now.K)])
     return float(now.bar[np.isfinite(now.bar)].max(initial=0.0)) / scale if scale > 0 else 0.0
 
 

@@ -33,7 +33,7 @@ def scout_mesh(problem: Problem) -> Mesh:
 def error(now: Indicators) -> float:
     """Mean half-width of K along the fronts of all states, over the largest K."""
     good = np.isfinite(now.bar).all(axis=1)
-    scale = now.scale_of(now.best[good])
+    scale = now.scale_of(now.K[good])
     return float(now.bar[good].max(axis=1).mean()) / scale if scale > 0 else 0.0
 
 
@@ -55,7 +55,7 @@ def finer(
     del places
     result = []
     for now, aim, size in zip(each, wanted, sizes, strict=True):
-        scale = now.scale_of(now.best[np.isfinite(now.best)])
+        scale = now.scale_of(now.K[np.isfinite(now.K)])
         over = error(now) * scale / aim if aim > 0 else 1.0
         result.append(size / np.clip(over, 1.0, _MOST**_POWER) ** (1 / _POWER))
     return each[0].problem.mesh, result

@@ -102,10 +102,10 @@ class DirectSystem:
     ----------
     matrix : sparse matrix (n_dof, n_dof)
         Stiffness in the basis of the space.
-    free : (n_dof,) array of bool
+    is_free : (n_dof,) array of bool
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis, scaled; zero in the rows of known unknowns.
-    reduced : sparse matrix (k, k)
+    basis_matrix : sparse matrix (k, k)
         Stiffness in that basis.
     apply_inverse : callable
     factor : Factor, optional
@@ -117,9 +117,9 @@ class DirectSystem:
     """
 
     matrix: sp.csr_matrix
-    free: Bools
+    is_free: Bools
     basis: sp.csr_matrix
-    reduced: sp.csc_matrix
+    basis_matrix: sp.csc_matrix
     apply_inverse: Solve
     factor: Factor | None = None
     tree: Tree | None = None

@@ -86,42 +86,42 @@ class Parts:
     ----------
     levels : Hierarchy
     K : sparse matrix (n_dof, n_dof)
-    plain : (n,) array of int
+    body_unknowns : (n,) array of int
         Unknowns of the hierarchy.
-    across : sparse matrix (n, e)
+    coupling : sparse matrix (n, e)
         Between them and the enriched columns, CSR.
-    own : sparse matrix (e, e)
+    enriched_block : sparse matrix (e, e)
     """
 
     levels: Hierarchy
     K: sp.csr_matrix
-    plain: Ints
-    across: sp.csr_matrix
-    own: sp.csr_matrix
+    body_unknowns: Ints
+    coupling: sp.csr_matrix
+    enriched_block: sp.csr_matrix
 
     @property
     def diagonal(self) -> Floats:
         """Of the whole matrix."""
-        return np.concatenate([self.levels.diagonal, self.own.diagonal()])
+        return np.concatenate([self.levels.diagonal, self.enriched_block.diagonal()])
 
     def stored(self, starts: Ints) -> BorderedFactor:
         """The whole matrix; `starts` are the first columns of the enriched nodes."""
-        first = np.concatenate([starts, [self.own.shape[0]]])
+        first = np.concatenate([starts, [self.enriched_block.shape[0]]])
         return BorderedFactor(
             self.levels.matrix,
-            row_blocks([self.across], self.levels.matrix.first),
-            row_blocks([self.across.T.tocsr(), self.own], first),
+            row_blocks([self.coupling], self.levels.matrix.first_row),
+            row_blocks([self.coupling.T.tocsr(), self.enriched_block], first),
         )
 
     def entries(self, chosen: Ints) -> sp.csr_matrix:
         """Entries between free unknowns, given sorted."""
-        n = len(self.plain)
+        n = len(self.body_unknowns)
         standard, enriched_numbers = chosen[chosen < n], chosen[chosen >= n] - n
-        standard_entries = self.plain[standard]
-        across = self.across[standard][:, enriched_numbers]
+        standard_entries = self.body_unknowns[standard]
+        across = self.coupling[standard][:, enriched_numbers]
         parts = [
             [self.K[standard_entries][:, standard_entries], across],
-            [across.T, self.own[enriched_numbers][:, enriched_numbers]],
+            [across.T, self.enriched_block[enriched_numbers][:, enriched_numbers]],
         ]
         return sp.csr_matrix(sp.bmat(parts))
 
@@ -131,8 +131,8 @@ def parts_of(levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_
     image = product(K, sp.csr_matrix(enriched))
     enriched_block = product(sp.csr_matrix(enriched.T), image)
     across = image[plain]
-    if not levels.free.all():
-        across = sp.csr_matrix(sp.diags(levels.free.astype(float)) @ across)
+    if not levels.is_free.all():
+        across = sp.csr_matrix(sp.diags(levels.is_free.astype(float)) @ across)
     return Parts(levels, K, plain, across, enriched_block)
 
 
@@ -175,9 +175,9 @@ class IterativeSystem:
     ----------
     matrix : Stiffness or sparse matrix (n_dof, n_dof)
         In the basis of the space.
-    within : sparse matrix (n_dof, n_dof), optional
+    node_entries : sparse matrix (n_dof, n_dof), optional
         Its entries between the unknowns of one node; made of the matrix where they are not given.
-    free : (n_dof,) array of bool
+    is_free : (n_dof,) array of bool
     basis : sparse matrix (n_dof, k)
         Columns of the solver's basis; zero in the rows of known unknowns.
     hierarchy : Hierarchy
@@ -185,19 +185,19 @@ class IterativeSystem:
     operator : Operator
     blocks : Blocks
         Unknowns of each enriched node.
-    combined, back : sparse matrices (n_dof, n_dof), optional
+    block_basis, back : sparse matrices (n_dof, n_dof), optional
         Basis to which the blocks belong where it is not that of the space, and its inverse.
     count : SolveCount
     """
 
     matrix: sp.csr_matrix | Stiffness
-    within: sp.csr_matrix | None
-    free: Bools
+    node_entries: sp.csr_matrix | None
+    is_free: Bools
     basis: sp.csr_matrix
     hierarchy: Hierarchy
     operator: Operator
     blocks: Blocks
-    combined: sp.csr_matrix | None = None
+    block_basis: sp.csr_matrix | None = None
     back: sp.csr_matrix | None = None
     count: SolveCount = field(default_factory=SolveCount)
     shared: str = "multigrid hierarchy"
@@ -361,7 +361,7 @@ class IterativeSystem:
         """
         if not u_imposed.any():
             return 1.0
-        forces = (self.matrix @ (u_imposed + self.basis @ y))[: len(self.hierarchy.fixed)]
+        forces = (self.matrix @ (u_imposed + self.basis @ y))[: len(self.hierarchy.is_fixed)]
         size = float(np.sqrt(np.einsum("i,i", b, b)))
         share = float(np.sqrt(np.einsum("i,i", forces, forces))) / size if size > 0 else 1.0
         return min(1.0, max(share, _LEAST_SHARE))
@@ -371,7 +371,7 @@ class IterativeSystem:
 
         Known unknowns count as zero.
         """
-        n = len(self.hierarchy.free)
+        n = len(self.hierarchy.is_free)
         enriched = self.basis[:, n:]
         y = ((enriched.T @ (self._node_entries @ u)).T / self.operator.diagonal[n:]).T
         return np.concatenate([self.basis[:, :n].T @ (u - enriched @ y), y])
@@ -379,11 +379,11 @@ class IterativeSystem:
     @cached_property
     def _node_entries(self) -> sp.csr_matrix:
         """Entries of the stiffness between unknowns of one node."""
-        if self.within is not None:
-            return self.within
-        assert self.combined is not None
+        if self.node_entries is not None:
+            return self.node_entries
+        assert self.block_basis is not None
         assert self.back is not None
-        K = nearby_unknowns(_joined_rows(self.matrix), self.combined, self.blocks)
+        K = nearby_unknowns(_joined_rows(self.matrix), self.block_basis, self.blocks)
         return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
 
 
@@ -426,7 +426,7 @@ def iterative_system(
     near_entries = _joined_rows(K, rows)  # after the levels, whose making needs the most memory
     free = ~fixed
     d = space.dim
-    plain = np.arange(len(levels.free))
+    plain = np.arange(len(levels.is_free))
     stars = space.order == 2 and space.n_functions > space.n_nodes
     combined, in_use, back = None, free, None
     if tip_columns is not None and space.tips:
@@ -440,19 +440,19 @@ def iterative_system(
     stored, diagonal = parts.stored(starts), parts.diagonal
     patches = None
     if stars and len(block):
-        home = np.where(levels.free, plain // d, -1)
+        home = np.where(levels.is_free, plain // d, -1)
         home = np.concatenate([home, node_groups.members[node_groups.offsets[block]] // d])
         patches = star_patches(space, home, len(plain), diagonal, parts.entries)
     within = within_blocks(near_entries, blocks) if combined is None else None
     del parts, near_entries  # before the cycle makes copies in single precision
     identity = sp.csr_matrix(
-        (levels.free.astype(float), (plain, np.arange(len(plain)))),
+        (levels.is_free.astype(float), (plain, np.arange(len(plain)))),
         shape=(space.n_dof, len(plain)),
     )
     basis = sp.csr_matrix(sp.hstack([identity, enriched]))
     null = np.zeros((0, 0)) if modes is None else modes[: len(plain)]
-    if null.shape[1] and not levels.free.all():
-        null = np.linalg.qr(null * levels.free[:, None])[0]
+    if null.shape[1] and not levels.is_free.all():
+        null = np.linalg.qr(null * levels.is_free[:, None])[0]
     cycle = extended_cycle(levels, stored, diagonal, patches)
     operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
     return IterativeSystem(K, within, lock(free), basis, levels, operator, blocks, combined, back)

@@ -78,7 +78,7 @@ class Factor:
     tree : Tree
     perm : (n,) array of int
         Unknown at each permuted place.
-    first : (parts + 1,) array of int
+    first_unknown : (parts + 1,) array of int
         First permuted unknown of each part.
     begin, boundary, in_parent : arrays of int
         Rows below each part, and their places in its parent's front.
@@ -89,15 +89,15 @@ class Factor:
         next factorisation.
     memory : tuple of arrays
         What the addresses lie in: numbers of this factorisation, and of earlier ones.
-    used : int
+    n_numbers : int
         Numbers in them that belong to this factor.
-    lowest : int
+    subtree_levels : int
         Levels of the subtrees that are factored as a whole; -1 where nothing is kept for the next.
     """
 
     tree: Tree
     perm: Ints
-    first: Ints
+    first_unknown: Ints
     begin: Ints
     boundary: Ints
     in_parent: Ints
@@ -107,15 +107,15 @@ class Factor:
     panel: Ints
     update: Ints
     memory: tuple[Floats, ...]
-    used: int
-    lowest: int
+    n_numbers: int
+    subtree_levels: int
 
     @property
     def fronts(self) -> tuple[Any, ...]:
         """What the kernels need to assemble fronts."""
         tree = self.tree
         return (
-            self.first, self.begin, self.in_parent, self.start, self.row, self.value,
+            self.first_unknown, self.begin, self.in_parent, self.start, self.row, self.value,
             tree.postorder, tree.rank,
         )  # fmt: skip
 
@@ -134,8 +134,8 @@ class Factor:
         place = inverse[B.indices]
         X = np.zeros((len(self.perm), B.shape[0]))
         X[place, np.arange(B.shape[0]).repeat(np.diff(B.indptr))] = B.data
-        part = np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
-        touched = np.zeros(len(self.first) - 1, dtype=bool)
+        part = np.repeat(np.arange(len(self.first_unknown) - 1), np.diff(self.first_unknown))
+        touched = np.zeros(len(self.first_unknown) - 1, dtype=bool)
         touched[part[place]] = True
         self._halves(X, True, False, touched)
         rows = np.nonzero(touched[part])[0]
@@ -163,15 +163,21 @@ class Factor:
             with one_blas_thread():
                 for x in columns:
                     substituted_one(
-                        self.first, self.begin, self.boundary, self.panel, x, forward, backward
+                        self.first_unknown,
+                        self.begin,
+                        self.boundary,
+                        self.panel,
+                        x,
+                        forward,
+                        backward,
                     )
             return np.ascontiguousarray(columns.T)
         if touched is None:
-            touched = np.ones(len(self.first) - 1, dtype=bool)
+            touched = np.ones(len(self.first_unknown) - 1, dtype=bool)
         tree = self.tree
         with one_blas_thread():
             substitute(
-                self.first, self.begin, self.boundary, tree.postorder, tree.rank, self.panel, X,
+                self.first_unknown, self.begin, self.boundary, tree.postorder, tree.rank, self.panel, X,
                 touched, forward, backward,
             )  # fmt: skip
         return X
@@ -229,7 +235,7 @@ def factorise(
     used = int(panel_size.sum() + (own_size.sum() if keep else 0))
     chosen_parts = np.ones(len(order), dtype=bool)
     earlier: tuple[Floats, ...] = ()
-    if before is not None and before.tree is tree and before.lowest == lowest <= depth:
+    if before is not None and before.tree is tree and before.subtree_levels == lowest <= depth:
         chosen_parts = _parts_to_factor(
             ~unchanged_parts(fronts, before.fronts), order, rank, height, lowest
         )

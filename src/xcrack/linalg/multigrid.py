@@ -60,7 +60,7 @@ class Patches:
         Where its inverse begins.
     inverse : array
         Symmetric inverses, row by row.
-    alone : (n,) array
+    inverse_diagonal : (n,) array
         Inverse diagonal of unknowns outside all blocks, 0 for the others.
     """
 
@@ -68,13 +68,13 @@ class Patches:
     start: Any
     offset: Any
     inverse: Any
-    alone: Any
+    inverse_diagonal: Any
 
     def times(self, r: Any) -> Any:
         """Sum of the solutions of all blocks, and of the unknowns outside, in single precision."""
         from xcrack.linalg.kernels.sparse import add_solved
 
-        out = self.alone * r
+        out = self.inverse_diagonal * r
         add_solved(self.members, self.start, self.offset, self.inverse, r, out)
         return out
 
@@ -169,9 +169,9 @@ class GridLevel:
     Attributes
     ----------
     matrix : RowBlocks or BorderedFactor
-    inverse : (n,) array
+    inverse_diagonal : (n,) array
         Inverse diagonal, 0 where the diagonal is.
-    largest : float
+    spectrum_bound : float
         Upper bound of the spectrum of D^-1 A.
     prolong, restrict : RowBlocks
         From and to the next level; their rows and columns are the leading unknowns of this one.
@@ -180,8 +180,8 @@ class GridLevel:
     """
 
     matrix: RowBlocks | BorderedFactor
-    inverse: Any
-    largest: float
+    inverse_diagonal: Any
+    spectrum_bound: float
     prolong: RowBlocks
     restrict: RowBlocks
     patches: Patches | None = None
@@ -193,7 +193,7 @@ class GridLevel:
     @cached_property
     def inverse_of_four(self) -> Any:
         """The inverse diagonal for four vectors that stand side by side."""
-        return lock(np.repeat(self.inverse, 4))
+        return lock(np.repeat(self.inverse_diagonal, 4))
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,12 +204,12 @@ class VCycle:
     ----------
     levels : tuple of GridLevel
         The finest first.
-    coarsest : (c, c) array
+    coarse_inverse : (c, c) array
         Pseudo-inverse of the last matrix.
     """
 
     levels: tuple[GridLevel, ...]
-    coarsest: Any
+    coarse_inverse: Any
 
     def __call__(self, r: Floats) -> Floats:
         """Approximate A^-1 r."""
@@ -228,7 +228,7 @@ class VCycle:
 
     def _solve_below(self, number: int, b: Any) -> Any:
         if number == len(self.levels):
-            return _by_column(self.coarsest.__matmul__, b)
+            return _by_column(self.coarse_inverse.__matmul__, b)
         level = self.levels[number]
         x, r = np.zeros_like(b), b  # nobody needs b any more
         d = _smooth(level, r, x)
@@ -254,13 +254,13 @@ def _smooth(level: GridLevel, r: Any, x: Any) -> Any:
     """Two Chebyshev steps; r is left one step behind x, by A times the result."""
     from xcrack.linalg.kernels.cycle import first_step, next_step
 
-    high, low = level.largest, _SHARE * level.largest
+    high, low = level.spectrum_bound, _SHARE * level.spectrum_bound
     middle, half = (high + low) / 2, (high - low) / 2
     sigma = middle / half
     rho = 1 / (2 * sigma - 1 / sigma)
     single = np.float32
     d = np.empty_like(x)
-    inverse = level.inverse if r.ndim == 1 else level.inverse_of_four
+    inverse = level.inverse_diagonal if r.ndim == 1 else level.inverse_of_four
     first_step(inverse, level.solved(r).ravel(), single(1 / middle), d.ravel(), x.ravel())
     level.matrix.added(r, -1, d)
     scale = single(2 * rho / half)
@@ -292,8 +292,8 @@ def largest_eigenvalue(
     w = np.sqrt(np.maximum(diagonal, 0.0)) * np.random.default_rng(_START).standard_normal(
         len(diagonal)
     )
-    if A.idle is not None:
-        w[A.idle] = 0.0
+    if A.idle_rows is not None:
+        w[A.idle_rows] = 0.0
     z, before = image(w), np.zeros_like(w)
     beta = float(np.sqrt(np.einsum("i,i", w, z)))
     alphas: list[float] = []
@@ -329,31 +329,31 @@ class Hierarchy:
     Attributes
     ----------
     bulk : Bulk
-    fixed : (n,) array of bool
+    is_fixed : (n,) array of bool
         Standard unknowns that supports decide.
-    free : (n,) array of bool
+    is_free : (n,) array of bool
         The others are zero: the rows of these are left out, and nobody moves them.
     matrix : RowBlocks (n, n)
         In double precision; in 3D it shares the memory of the body's stiffness.
     diagonal : (n,) array
     levels : tuple of GridLevel
         The uncracked body first.
-    coarsest : (c, c) array
+    coarse_inverse : (c, c) array
         Pseudo-inverse of the last matrix.
     """
 
     bulk: Bulk
-    fixed: Bools
-    free: Bools
+    is_fixed: Bools
+    is_free: Bools
     matrix: RowBlocks
     diagonal: Floats
     levels: tuple[GridLevel, ...]
-    coarsest: Any
+    coarse_inverse: Any
 
     def fits(self, bulk: Bulk, fixed: Bools) -> bool:
         """Whether the hierarchy is that of a stiffness and its supports."""
-        n = len(self.fixed)
-        return self.bulk.matrix is bulk.matrix and np.array_equal(self.fixed, fixed[:n])
+        n = len(self.is_fixed)
+        return self.bulk.matrix is bulk.matrix and np.array_equal(self.is_fixed, fixed[:n])
 
 
 def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
@@ -371,7 +371,7 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
     free, diagonal = ~fixed, _diagonal(A)
     finest = store_blocks(A, np.float64)
     if fixed.any():
-        finest = replace(finest, idle=lock(np.nonzero(fixed)[0]))
+        finest = replace(finest, idle_rows=lock(np.nonzero(fixed)[0]))
     if bulk.order == 2:
         levels, coarsest = _over_linear(bulk, fixed, finest, diagonal)
     else:
@@ -380,12 +380,12 @@ def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
         levels, coarsest = _aggregation_levels(A, finest, motions, alone)
     return Hierarchy(
         bulk=bulk,
-        fixed=lock(fixed),
-        free=lock(free),
+        is_fixed=lock(fixed),
+        is_free=lock(free),
         matrix=finest,
         diagonal=lock(diagonal),
         levels=levels,
-        coarsest=coarsest,
+        coarse_inverse=coarsest,
     )
 
 
@@ -401,7 +401,7 @@ def _aggregation_levels(
         blocks = store_blocks(A) if levels else finest.single()
         diagonal = _diagonal(A)
         largest = largest_eigenvalue(blocks, diagonal)
-        P, candidates = _prolongator(A, diagonal, largest, candidates, alone, blocks.idle)
+        P, candidates = _prolongator(A, diagonal, largest, candidates, alone, blocks.idle_rows)
         scale = float(diagonal.max())
         A, small = _coarse_matrix(A, P), sp.bsr_matrix(P, dtype=np.float32)
         alone = np.zeros(len(A.indptr) - 1, dtype=bool)
@@ -443,10 +443,10 @@ def _over_linear(
     half = 0.5 * stars(mesh, 2)
     half.setdiag(1.0)
     P = sp.kron(half.T.tocsr(), sp.identity(d))
-    P = sp.bsr_matrix(sp.diags(~fixed * 1.0) @ P @ sp.diags(lower.free * 1.0), blocksize=(d, d))
+    P = sp.bsr_matrix(sp.diags(~fixed * 1.0) @ P @ sp.diags(lower.is_free * 1.0), blocksize=(d, d))
     single = finest.single()
     top = _level(single, diagonal, largest_eigenvalue(single, diagonal), P)
-    return (top, *lower.levels), lower.coarsest
+    return (top, *lower.levels), lower.coarse_inverse
 
 
 def extended_cycle(
@@ -465,7 +465,7 @@ def extended_cycle(
     """
     finest = levels.levels[0]
     standard = cast(RowBlocks, finest.matrix)
-    single = BorderedFactor(standard, A.across.single(), A.below.single())
+    single = BorderedFactor(standard, A.coupling.single(), A.border_rows.single())
     if patches is None:
         inverse = reciprocal(diagonal).astype(np.float32)
         largest = largest_eigenvalue(single, diagonal)
@@ -473,7 +473,7 @@ def extended_cycle(
         inverse = np.ones(len(diagonal), np.float32)
         largest = largest_eigenvalue(single, diagonal, patches.times)
     top = GridLevel(single, lock(inverse), largest, finest.prolong, finest.restrict, patches)
-    return VCycle((top, *levels.levels[1:]), levels.coarsest)
+    return VCycle((top, *levels.levels[1:]), levels.coarse_inverse)
 
 
 def _diagonal(A: sp.bsr_matrix) -> Floats:

@@ -94,21 +94,21 @@ class RowBlocks:
     Attributes
     ----------
     shape : (rows, columns)
-    first, start, offset : (b + 1,) arrays of uint32
+    first_row, start, offset : (b + 1,) arrays of uint32
         First row, column list and values of each block.
     columns : array of uint32
     values : array, float32 or float64
-    idle : (k,) array of int, optional
+    idle_rows : (k,) array of int, optional
         Rows that count as zero whatever the values.
     """
 
     shape: tuple[int, int]
-    first: Any
+    first_row: Any
     start: Any
     offset: Any
     columns: Any
     values: Any
-    idle: Ints | None = None
+    idle_rows: Ints | None = None
 
     @property
     def dtype(self) -> Any:
@@ -126,11 +126,11 @@ class RowBlocks:
         else:
             from xcrack.linalg.kernels.cycle import product_of_four as multiply
         number = self.dtype.type(scale)
-        unchanged = None if self.idle is None else y[self.idle]
+        unchanged = None if self.idle_rows is None else y[self.idle_rows]
 
         def rows(stretch: slice) -> None:
             multiply(
-                self.first[stretch], self.start[stretch], self.offset[stretch], self.columns,
+                self.first_row[stretch], self.start[stretch], self.offset[stretch], self.columns,
                 self.values, x, y, number, y,
             )  # fmt: skip
 
@@ -138,7 +138,7 @@ class RowBlocks:
         count = min(number_of_threads(), entries // _LEAST)
         map_tasks(rows, self._stretches(count))
         if unchanged is not None:
-            y[self.idle] = unchanged
+            y[self.idle_rows] = unchanged
         return y
 
     def _stretches(self, count: int) -> list[slice]:
@@ -146,7 +146,7 @@ class RowBlocks:
         if count < 2:
             return [slice(None)]
         targets = np.arange(1, count) * (len(self.values) / count)
-        ends = [0, *np.searchsorted(self.offset, targets), len(self.first) - 1]
+        ends = [0, *np.searchsorted(self.offset, targets), len(self.first_row) - 1]
         return [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
 
     def single(self) -> "RowBlocks":
@@ -252,30 +252,30 @@ class BorderedFactor:
 
     Attributes
     ----------
-    standard : RowBlocks (n, n)
-    across : RowBlocks (n, e)
-    below : RowBlocks (e, n + e)
+    body_block : RowBlocks (n, n)
+    coupling : RowBlocks (n, e)
+    border_rows : RowBlocks (e, n + e)
     """
 
-    standard: RowBlocks
-    across: RowBlocks
-    below: RowBlocks
+    body_block: RowBlocks
+    coupling: RowBlocks
+    border_rows: RowBlocks
 
     @property
-    def idle(self) -> Ints | None:
+    def idle_rows(self) -> Ints | None:
         """Rows that count as zero."""
-        return self.standard.idle
+        return self.body_block.idle_rows
 
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers of rows and columns."""
-        n = self.below.shape[1]
+        n = self.border_rows.shape[1]
         return n, n
 
     @property
     def dtype(self) -> Any:
         """Type of the values."""
-        return self.standard.dtype
+        return self.body_block.dtype
 
     def times(self, x: Any) -> Any:
         """A x, in the type of the values; see `RowBlocks.added`."""
@@ -287,8 +287,8 @@ class BorderedFactor:
 
     def added(self, y: Any, scale: float, x: Any) -> Any:
         """Write y + scale A x over y, and return it; see `RowBlocks.added`."""
-        n = self.standard.shape[0]
-        self.standard.added(y[:n], scale, x[:n])
-        self.across.added(y[:n], scale, x[n:])
-        self.below.added(y[n:], scale, x)
+        n = self.body_block.shape[0]
+        self.body_block.added(y[:n], scale, x[:n])
+        self.coupling.added(y[:n], scale, x[n:])
+        self.border_rows.added(y[n:], scale, x)
         return y

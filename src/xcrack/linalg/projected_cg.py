@@ -389,7 +389,7 @@ class _Loop:
     d: Floats
     measure: Floats
     stiffness: float
-    movable: Bools
+    is_movable: Bools
     scale: Floats
     tolerance: float
     limit: int
@@ -453,7 +453,7 @@ class _Loop:
         pressure[active] = descent.pressure
         gap = self.N @ descent.y + self.d
         gap[active] = 0.0
-        trial = np.where(self.movable, pressure - self.stiffness * gap / self.measure, 0.0)
+        trial = np.where(self.is_movable, pressure - self.stiffness * gap / self.measure, 0.0)
         # What lies within the accuracy of the iteration changes nothing: faces that only touch
         # must not make the set flicker.
         doubt = self.tolerance * float(np.abs(trial).max(initial=0.0))
@@ -468,14 +468,14 @@ class _Loop:
     def _size(self) -> Iteration[float]:
         """Size of the load; where only gaps are imposed, of the forces that close them."""
         size = _norm(self.b)
-        plane = self._plane_of(self.movable)
+        plane = self._plane_of(self.is_movable)
         if size > 0 or plane is None:
             return size
         return _norm((yield Request.TIMES, plane.nearest(np.zeros(len(self.b)))))
 
     def _result(self, y: Floats, pressure: Floats, gap: Floats, active: Bools) -> ProjectedState:
         length = np.abs(gap / self.measure).max(initial=0.0)
-        stuck = ~self.movable & (gap / self.measure < -1e-8 * length)
+        stuck = ~self.is_movable & (gap / self.measure < -1e-8 * length)
         if stuck.any():
             raise ConvergenceError(
                 f"contact: {int(stuck.sum())} of {len(gap)} groups are pressed into each other by "

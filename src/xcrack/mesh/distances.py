@@ -45,22 +45,22 @@ class TriangleTree:
     corners : (k, 3, 3) array, length
     normal : (k, 3) array
         Unit normals.
-    beside : (k, 6, 3) array
+    feature_normals : (k, 6, 3) array
         Normals at the corners 0, 1, 2 and at the sides 0-1, 1-2, 2-0, of any length.
     rim : (k, 6) array of bool
         Which corners and sides lie on the boundary of the surface.
     boxes : tuple of arrays
         As `kernels.triangles.box_tree` makes them.
-    tiny : float, length
+    distance_tolerance : float, length
         Distances that differ by less are equal.
     """
 
     corners: Floats
     normal: Floats
-    beside: Floats
+    feature_normals: Floats
     rim: Bools
     boxes: tuple[Ints, Ints, Floats, Floats]
-    tiny: float
+    distance_tolerance: float
 
 
 def triangle_tree(points: Floats, triangles: Ints) -> TriangleTree:
@@ -99,7 +99,13 @@ def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> NearestPo
     # A copy is never read-only, for which the kernel would be compiled once more.
     points = np.array(x, dtype=float, order="C")
     nearest = _in_parts(
-        closest_triangle, points, tree.corners, tree.normal, *tree.boxes, float(band), tree.tiny
+        closest_triangle,
+        points,
+        tree.corners,
+        tree.normal,
+        *tree.boxes,
+        float(band),
+        tree.distance_tolerance,
     )
     return NearestPoint(*nearest)
 
@@ -125,7 +131,7 @@ def signed_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> tuple[Floa
     phi[flat] = np.einsum("ij,ij->i", x[flat] - tree.corners[t, 0], tree.normal[t])
     edge = np.nonzero(closest.part > 0)[0]
     t, part = closest.triangle[edge], closest.part[edge] - 1
-    side = np.einsum("ij,ij->i", x[edge] - closest.foot[edge], tree.beside[t, part])
+    side = np.einsum("ij,ij->i", x[edge] - closest.foot[edge], tree.feature_normals[t, part])
     phi[edge] = np.copysign(phi[edge], side)
     on_boundary[edge] = tree.rim[t, part]
     return phi, closest.triangle, on_boundary

@@ -33,11 +33,11 @@ class Simplices:
     points : (n, d) array, length
     cells : (m, d + 1) array of int
     edges : (e, 2) array of int
-    middle : (e, d) array, length
+    edge_middles : (e, d) array, length
     rank : (e, 2 d + 1) array of int
         Order of the edges: length, the longest lowest, direction, place of the middle.
     cell_to_edge : (m, d (d + 1) / 2) array of int
-    longest : (m,) array of int
+    longest_edge : (m,) array of int
         Local number of each cell's longest edge.
     facet : (m, d + 1) array of int
         Facet of the mesh at the beginning in which each cell's facet lies; -1 inside, and for
@@ -49,17 +49,17 @@ class Simplices:
     points: Floats
     cells: Ints
     edges: Ints
-    middle: Floats
+    edge_middles: Floats
     rank: Ints
     cell_to_edge: Ints
-    longest: Ints
+    longest_edge: Ints
     facet: Ints
     parent: Ints
 
     @property
     def size(self) -> Floats:
         """Longest edge of each cell `(m,)`, length."""
-        ends = self.points[self.edges[_row(self.cell_to_edge, self.longest)]]
+        ends = self.points[self.edges[_row(self.cell_to_edge, self.longest_edge)]]
         return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     @property
@@ -83,7 +83,7 @@ def moved_simplices(simplex_set: Simplices, points: Floats) -> Simplices:
     """The same simplices with their points at other places."""
     middle, rank = _ranked_edges(points, simplex_set.edges)
     longest = _longest_edges(middle, rank, simplex_set.cell_to_edge)
-    return replace(simplex_set, points=points, middle=middle, rank=rank, longest=longest)
+    return replace(simplex_set, points=points, edge_middles=middle, rank=rank, longest_edge=longest)
 
 
 def bisect_simplices(simplex_set: Simplices, marked: Bools) -> tuple[Simplices, Bools]:
@@ -103,14 +103,14 @@ def bisect_simplices(simplex_set: Simplices, marked: Bools) -> tuple[Simplices, 
     """
     untouched = np.ones(len(simplex_set.cells), dtype=bool)
     split = np.zeros(len(simplex_set.edges), dtype=bool)
-    split[_row(simplex_set.cell_to_edge, simplex_set.longest)[marked]] = True
+    split[_row(simplex_set.cell_to_edge, simplex_set.longest_edge)[marked]] = True
     # Of each split edge its middle, and the first of its two halves.
     point, half = np.full((2, len(split)), -1, dtype=np.int64)
     middle_edges, number = np.zeros(
         (2, 0), dtype=np.int64
     )  # edges between a middle and another point
     while True:
-        top = _row(simplex_set.cell_to_edge, simplex_set.longest)
+        top = _row(simplex_set.cell_to_edge, simplex_set.longest_edge)
         hanging = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
         while (ahead := hanging & ~split[top]).any():
             split[top[ahead]] = True
@@ -126,7 +126,7 @@ def bisect_simplices(simplex_set: Simplices, marked: Bools) -> tuple[Simplices, 
         ends, middle = simplex_set.edges[new], point[new]
         halves = np.stack([ends[:, 0], middle, ends[:, 1], middle], axis=1).reshape(-1, 2)
         simplex_set = replace(
-            simplex_set, points=np.concatenate([simplex_set.points, simplex_set.middle[new]])
+            simplex_set, points=np.concatenate([simplex_set.points, simplex_set.edge_middles[new]])
         )
         simplex_set = _with_edges(simplex_set, halves)
         across = _edges_across(simplex_set, hanging, point)
@@ -182,7 +182,7 @@ def _with_edges(simplex_set: Simplices, edges: Ints) -> Simplices:
     return replace(
         simplex_set,
         edges=np.concatenate([simplex_set.edges, edges]),
-        middle=np.concatenate([simplex_set.middle, middle]),
+        edge_middles=np.concatenate([simplex_set.edge_middles, middle]),
         rank=np.concatenate([simplex_set.rank, rank]),
     )
 
@@ -191,7 +191,7 @@ def _edges_across(simplex_set: Simplices, rows: Bools, point: Ints) -> Ints:
     """Edges from the middle of each cell's longest edge to its other points `(k, d - 1, 2)`."""
     dim = simplex_set.cells.shape[1] - 1
     others = np.array([[k for k in range(dim + 1) if k not in pair] for pair in local_edges(dim)])
-    longest, cells = simplex_set.longest[rows], simplex_set.cells[rows]
+    longest, cells = simplex_set.longest_edge[rows], simplex_set.cells[rows]
     middle = point[_row(simplex_set.cell_to_edge[rows], longest)]
     other = np.take_along_axis(cells, others[longest], axis=1)
     return np.stack([other, np.broadcast_to(middle[:, None], other.shape)], axis=-1)
@@ -208,7 +208,7 @@ def _halved_cells(
     others = np.array([[k for k in range(dim + 1) if k not in pair] for pair in pairs])
     cells, longest, facet = (
         simplex_set.cells[rows],
-        simplex_set.longest[rows],
+        simplex_set.longest_edge[rows],
         simplex_set.facet[rows],
     )
     edges = simplex_set.cell_to_edge[rows]
@@ -226,12 +226,12 @@ def _halved_cells(
         children.append((corners, sides, outside))
     corners, sides, outside = (np.concatenate(parts) for parts in zip(*children, strict=True))
     is_unsplit = ~rows
-    longest = _longest_edges(simplex_set.middle, simplex_set.rank, sides)
+    longest = _longest_edges(simplex_set.edge_middles, simplex_set.rank, sides)
     return replace(
         simplex_set,
         cells=np.concatenate([simplex_set.cells[is_unsplit], corners]),
         cell_to_edge=np.concatenate([simplex_set.cell_to_edge[is_unsplit], sides]),
-        longest=np.concatenate([simplex_set.longest[is_unsplit], longest]),
+        longest_edge=np.concatenate([simplex_set.longest_edge[is_unsplit], longest]),
         facet=np.concatenate([simplex_set.facet[is_unsplit], outside]),
         parent=np.concatenate(
             [simplex_set.parent[is_unsplit], np.tile(simplex_set.parent[rows], 2)]

@@ -43,7 +43,7 @@ class PieceCells:
 
     Attributes
     ----------
-    plain : (m,) array of int
+    plain_cells : (m,) array of int
         Cells drawn whole.
     cell : (s,) array of int
         Cell of each sub-cell of the others.
@@ -53,7 +53,7 @@ class PieceCells:
         Side of each crack, 0 where that means nothing.
     """
 
-    plain: Ints
+    plain_cells: Ints
     cell: Ints
     bary: Floats
     side: Ints
@@ -220,7 +220,7 @@ def pieces(solution: Solution) -> Pieces:
     space = solution.space
     mesh, d = space.mesh, space.dim
     cells = piece_cells(space)
-    plain = cells.plain
+    plain = cells.plain_cells
     whole_pieces = np.broadcast_to(np.eye(d + 1), (len(plain), d + 1, d + 1))
     blocks = [
         _Block.of(space, plain, whole_pieces, space.order),
@@ -236,14 +236,14 @@ def pieces(solution: Solution) -> Pieces:
     x = np.empty((n, d))
     u = np.empty((n, d))
     with np.errstate(divide="ignore", invalid="ignore"):  # the gradient at a tip, not looked at
-        x[joined], u[joined] = blocks[1].x, solution.at(*blocks[1].where)[0]
+        x[joined], u[joined] = blocks[1].x, solution.at(*blocks[1].places)[0]
     x[: len(used)], u[: len(used)] = space.node_points[used], solution.coefficients[used]
     stress, center = zip(*[_stresses(solution, block) for block in blocks], strict=True)
     weight = np.concatenate([block.weight for block in blocks])
     every, origin = np.concatenate(point), np.arange(n)
     set_number = solution.problem.elasticity.set_number
     if len(set_number):
-        owner = np.concatenate([block.where[0] for block in blocks])
+        owner = np.concatenate([block.places[0] for block in blocks])
         every, origin = _apart_by_material(every, set_number[owner], n)
         n, x, u, source = len(origin), x[origin], u[origin], source[origin]
         number, joined = every[: number.size].reshape(number.shape), every[number.size :]
@@ -251,7 +251,7 @@ def pieces(solution: Solution) -> Pieces:
     values = np.concatenate(stress).reshape(-1, 9)
     mean = np.stack([np.bincount(every, weight * v, n) / total for v in values.T], axis=1)
 
-    cell, bary = (np.concatenate([b.where[i] for b in blocks]) for i in (0, 1))
+    cell, bary = (np.concatenate([b.places[i] for b in blocks]) for i in (0, 1))
     corner = mesh.cells[cell[source]]
     levels = [cut.level_set for cut in space.cuts]
     return Pieces(
@@ -286,7 +286,7 @@ def _apart_by_material(point: Ints, material: Ints, n: int) -> tuple[Ints, Ints]
 class _Block:
     """Nodes of pieces, piece by piece: cell, coordinates in it, sides, place, weight."""
 
-    where: tuple[Ints, Floats, Ints]
+    places: tuple[Ints, Floats, Ints]
     x: Floats
     weight: Floats
     center: tuple[Ints, Floats, Ints]
@@ -324,7 +324,7 @@ def _join(
     n_plain, n_rows = len(used), len(plain.weight)
     old = np.nonzero(shared)[0]
     cell, bary, side = (
-        np.concatenate([a[first[old]], b]) for a, b in zip(plain.where, split.where, strict=True)
+        np.concatenate([a[first[old]], b]) for a, b in zip(plain.places, split.places, strict=True)
     )
     x = np.concatenate([plain.x[first[old]], split.x])
     size = float(space.mesh.cell_size.min())
@@ -369,7 +369,7 @@ def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
 
 def _stresses(solution: Solution, block: _Block) -> tuple[Floats, Floats]:
     """Stress at the nodes of pieces, and at their centres."""
-    cell, bary, side = block.where
+    cell, bary, side = block.places
     center = block.center[1]
     each = len(cell) // max(len(center), 1)
     if solution.space.tips:

@@ -373,7 +373,7 @@ def _of_levels(history: History, lead: DrivingForce, law: Law, block: SpectrumBl
     """A third of the change of the life with every second level left out."""
     if all(block.is_solved(step) for step in history.steps):
         return 0.0
-    coarse = driving_forces(history.steps, replace(block, coarse=True)).lead
+    coarse = driving_forces(history.steps, replace(block, is_thinned=True)).lead
     return _change_of_life(lead, coarse.rates(law)) / 3
 
 

@@ -37,7 +37,7 @@ class SpectrumBlock:
     nu : float
     threshold : float, stress √length
         Of the run: cycles below it do not count.
-    coarse : bool
+    is_thinned : bool
         Leave every second level out, to see what the levels are worth.
     """
 
@@ -45,7 +45,7 @@ class SpectrumBlock:
     criterion: Criterion
     nu: float
     threshold: float = 0.0
-    coarse: bool = False
+    is_thinned: bool = False
 
     @property
     def values(self) -> Floats:
@@ -78,11 +78,11 @@ class SpectrumBlock:
         levels = np.array(step.levels)
         if len(levels) == 2 and levels[0] < 0 < levels[1] and not self.spectrum.steady:
             levels = np.array([levels[0], 0.0, levels[1]])
-            return LevelTable(levels, np.stack([K[0], np.zeros_like(K[0]), K[1]]), smooth=False)
-        if self.coarse and len(levels) > 2:
+            return LevelTable(levels, np.stack([K[0], np.zeros_like(K[0]), K[1]]), is_smooth=False)
+        if self.is_thinned and len(levels) > 2:
             chosen = np.unique([*range(0, len(levels), 2), len(levels) - 1])
             levels, K = levels[chosen], K[chosen]
-        return LevelTable(levels, K, smooth=len(levels) > 2)
+        return LevelTable(levels, K, is_smooth=len(levels) > 2)
 
     def check(self, step: Step, what: str) -> None:
         """Refuse a spectrum that is not that of a step.

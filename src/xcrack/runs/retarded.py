@@ -261,7 +261,7 @@ def _ends(
         if len(levels) == 2 and levels[0] < 0 < levels[1] and not spectrum.steady:
             levels = np.array([levels[0], 0.0, levels[1]])
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
-        ladder = LevelTable(levels, K, smooth=len(levels) > 3)
+        ladder = LevelTable(levels, K, is_smooth=len(levels) > 3)
         angle = step.angle[crack][place]
         both = [equivalent_K(clipped_K(ladder.at(values[:, k])), angle, nu)[:, 0] for k in (0, 1)]
         result.append(np.stack([np.minimum(*both), np.maximum(*both)], axis=1))

@@ -23,19 +23,19 @@ class Domain:
 
     Attributes
     ----------
-    outer : float, length
+    outer_radius : float, length
         Outer radius of the first domain.
-    wanted : float, length
+    free_radius : float, length
         What it would be without neighbours.
     room : float, length
         What boundary, other cracks, and bends of a front leave.
-    least : float, length
+    least_room : float, length
         Room below which large errors are common.
-    short : bool
+    is_short : bool
         Whether the crack is so short that they are common too.
     size : float, length
         Of the cells there.
-    narrowest : (d,) array, length
+    narrow_place : (d,) array, length
         Where the room is least.
     differ : float
         Share of K by which two domains may differ.
@@ -49,13 +49,13 @@ class Domain:
         Distance to another material; inf where there is none.
     """
 
-    outer: float
-    wanted: float
+    outer_radius: float
+    free_radius: float
     room: float
-    least: float
-    short: bool
+    least_room: float
+    is_short: bool
     size: float
-    narrowest: Floats
+    narrow_place: Floats
     differ: float
     label: str
     bend: float = np.inf
@@ -107,10 +107,10 @@ def check(
     scales = [scale_of(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
     difference, place = _difference(domain, parts, scales)
     doubts = [difference, _overlap_warning(solutions, domain, parts, scales)]
-    narrow = domain.room < domain.least or domain.short
-    is_clipped = domain.outer < domain.wanted * (1 - 1e-12)
+    narrow = domain.room < domain.least_room or domain.is_short
+    is_clipped = domain.outer_radius < domain.free_radius * (1 - 1e-12)
     if is_clipped and (narrow or any(doubts)) and disagree():
-        place = domain.narrowest
+        place = domain.narrow_place
         doubts.insert(0, _clipped_K(domain))
     else:
         doubts = [difference]
@@ -146,12 +146,12 @@ def scale_of(solution: Solution, part: SIF, radius: float) -> float:
 
 def _clipped_K(domain: Domain) -> str:
     text = (
-        f"the domain is clipped to {domain.outer:.4g} ({domain.outer / domain.size:.1f} cells) by "
+        f"the domain is clipped to {domain.outer_radius:.4g} ({domain.outer_radius / domain.size:.1f} cells) by "
         "the boundary, another tip or crack, or a bend of the front"
     )
-    if domain.room < domain.least:
-        return f"{text}, and errors are small from {domain.least / domain.size:.3g} cells on"
-    return f"{text}, and the crack is only a few cells long" if domain.short else text
+    if domain.room < domain.least_room:
+        return f"{text}, and errors are small from {domain.least_room / domain.size:.3g} cells on"
+    return f"{text}, and the crack is only a few cells long" if domain.is_short else text
 
 
 def _sharp_bend(domain: Domain) -> str:
@@ -182,7 +182,7 @@ def _difference(
     domain: Domain, parts: Sequence[SIF], scales: Sequence[float]
 ) -> tuple[str, Floats]:
     """By how much two domains differ where that is too much, and the place."""
-    worst, text, place = domain.differ, "", domain.narrowest
+    worst, text, place = domain.differ, "", domain.narrow_place
     for part, scale in zip(parts, scales, strict=True):
         spread = np.array(part.spread)
         spread[part.closed, 0] = 0.0  # K_I is exact there
@@ -192,7 +192,7 @@ def _difference(
             worst = difference / scale
             place = part.x[inner][np.argmax(spread[inner].max(axis=1))]
             text = (
-                f"domains of radius {domain.outer:.4g} and less differ by {difference:.3g}, "
+                f"domains of radius {domain.outer_radius:.4g} and less differ by {difference:.3g}, "
                 f"{100 * worst:.2g} % of the largest K"
             )
     return text, place

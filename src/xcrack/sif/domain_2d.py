@@ -37,20 +37,20 @@ class RingPart:
 
     Attributes
     ----------
-    plain : (k,) array of int
+    plain_cells : (k,) array of int
         On which no enriched function acts.
     degree : int
         Of the rule for them.
-    others : iterable of Tabulated
+    other_points : iterable of Tabulated
         Points of the other cells.
     differs : bool
         Whether their stiffness may be another one than that at the tip: they count wherever the
         weight q is not zero, others only where its gradient is not.
     """
 
-    plain: Ints
+    plain_cells: Ints
     degree: int
-    others: Iterable[Tabulated]
+    other_points: Iterable[Tabulated]
     differs: bool
 
 
@@ -76,7 +76,7 @@ def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Itera
     if stored is None:
         stored = tuple(parts)
         # More than one chunk of cells is too much to be stored.
-        if all(isinstance(part.others, tuple) for part in stored):
+        if all(isinstance(part.other_points, tuple) for part in stored):
             factored.around_tips[key] = stored
     return stored
 
@@ -205,7 +205,7 @@ def _tip_intensity(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], Do
     """K and T at one tip of each state, and the domain they are from."""
     tip = solutions[0].space.tips[t]
     domain = domain_of(solutions[0], t)
-    outer = domain.outer
+    outer = domain.outer_radius
     radii = radii_of(domain)
     tip_material = material_at_tip(solutions[0], t)
     E_prime = tip_material.E_prime
@@ -233,7 +233,7 @@ def _tip_intensity(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], Do
 
 def radii_of(domain: Domain) -> Floats:
     """Outer radii of the two domains `(2,)`."""
-    outer = domain.outer
+    outer = domain.outer_radius
     return np.array([outer, max(_SECOND * outer, min(outer, 1.5 * domain.size))])
 
 
@@ -247,7 +247,7 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     hollow = float(ring.inner.min())
     for part in ring_parts(solutions[0], t, hollow, outer):
         total += plain_terms(solutions, ring, part)
-        for values in part.others:
+        for values in part.other_points:
             total += point_terms(solutions, ring, values, part.differs)
     if has_effect(solutions, "volume", "initial_stress"):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
@@ -288,13 +288,13 @@ def domain_of(solution: Solution, t: int) -> Domain:
     if solution.contact[tip.crack] is not None:
         shortest = _SHORT_CONTACT
     return Domain(
-        outer=min(radius, max(limit, 1.2 * size)),
-        wanted=radius,
+        outer_radius=min(radius, max(limit, 1.2 * size)),
+        free_radius=radius,
         room=room,
-        least=_ROOM[space.order] * size,
-        short=float(solution.lips[tip.crack].weight.sum()) < shortest * size,
+        least_room=_ROOM[space.order] * size,
+        is_short=float(solution.lips[tip.crack].weight.sum()) < shortest * size,
         size=size,
-        narrowest=tip.x,
+        narrow_place=tip.x,
         differ=_DIFFER[space.order],
         label="K at",
         interface=_distance_to_interface(solution, tip.x),

@@ -78,13 +78,13 @@ class FrontValues:
         Parameters of the tops.
     K : (n, 2, p, 3) array, stress · √length
         Of n states and two domains; nan where nothing is known.
-    mean : (n, p, 3) array, stress · √length
+    mean_K : (n, p, 3) array, stress · √length
         Means over the hats, of the first domains.
-    valid : (p,) array of bool
+    is_known : (p,) array of bool
         Hats whose integrals are known.
-    wide : (n, 2, p, 3) array, stress · √length
+    wide_K : (n, 2, p, 3) array, stress · √length
         K there, with hats twice as wide.
-    smooth : (p,) array of bool
+    is_smooth : (p,) array of bool
         Hats at smooth planes perpendicular to the front.
     radius : (p,) array, length
         Outer radius of the domain of each hat.
@@ -94,10 +94,10 @@ class FrontValues:
 
     knots: Floats
     K: Floats
-    mean: Floats
-    valid: Bools
-    wide: Floats
-    smooth: Bools
+    mean_K: Floats
+    is_known: Bools
+    wide_K: Floats
+    is_smooth: Bools
     radius: Floats
     domain: Domain
 
@@ -151,7 +151,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     if ends is None or not len(s):
         return [empty] * len(solutions)
     values = front_values(solutions, t, curve, ends, materials)
-    if not values.valid.any():
+    if not values.is_known.any():
         _warn_unknown(x, values)
         return [empty] * len(solutions)
     depth = _depth(solutions[0], curve, ends)
@@ -161,16 +161,16 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     )
     read, passes = materials.beside_changes(read, values.domain.size)
     everywhere = np.append(read, (ends[0] + depth, ends[1] - depth))
-    matrix = reading(values.knots, values.valid, curve, everywhere)
-    K = np.einsum("sv,nkvm->nksm", matrix, values.K[:, :, values.valid])
-    wide = np.einsum("sv,nvm->nsm", matrix, values.wide[:, 0][:, values.valid])
+    matrix = reading(values.knots, values.is_known, curve, everywhere)
+    K = np.einsum("sv,nkvm->nksm", matrix, values.K[:, :, values.is_known])
+    wide = np.einsum("sv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
     if not materials.is_one:
         of_material = materials.factors(everywhere)
         K, wide = K * of_material, wide * of_material
-        values = replace(values, mean=values.mean * materials.factors(values.knots))
+        values = replace(values, mean_K=values.mean_K * materials.factors(values.knots))
     period = curve.length if closed else None
     cells = np.interp(s, values.knots, values.radius, period=period) / values.domain.size
-    at_surface = (read != s) | ~_covered_parameters(curve, values.knots, values.valid, s)
+    at_surface = (read != s) | ~_covered_parameters(curve, values.knots, values.is_known, s)
     result = []
     for n, solution in enumerate(solutions):
         rows = K[n, :, : len(s)]
@@ -200,7 +200,7 @@ def _surface_end(
 ) -> SurfaceEnd:  # fmt: skip
     """What is known where a front comes to a free surface."""
     x = curve.at(np.array([s]))[0][0]
-    K, mean = np.array(K), np.array(values.mean[n, e])
+    K, mean = np.array(K), np.array(values.mean_K[n, e])
     if sif.closed[np.linalg.norm(sif.x - x, axis=1).argmin()]:
         K[0] = mean[0] = 0.0
     width = abs(float(values.knots[e] - values.knots[e + 1 if e == 0 else e - 1]))
@@ -218,7 +218,7 @@ def _free_ends(curve: FrontCurve, values: FrontValues) -> tuple[bool, bool]:
     """Whether a front has a first and a last end at a surface whose tractions are known."""
     if curve.closed:
         return False, False
-    known = values.valid & ~values.smooth
+    known = values.is_known & ~values.is_smooth
     return bool(known[0]), bool(known[-1])
 
 
@@ -315,13 +315,13 @@ def front_values(
     bend = curve.bend(knots, _BEND_OVER * size)
     bend_at = int(np.argmin(bend))
     domain = Domain(
-        outer=float(radius.min()),
-        wanted=wanted,
+        outer_radius=float(radius.min()),
+        free_radius=wanted,
         room=float(room[least]),
-        least=_NARROW * size,
-        short=False,
+        least_room=_NARROW * size,
+        is_short=False,
         size=size,
-        narrowest=curve.at(knots[[least]])[0][0],
+        narrow_place=curve.at(knots[[least]])[0][0],
         differ=_DIFFER,
         label="K along the front, at",
         bend=float(bend[bend_at]),

@@ -57,14 +57,14 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     )  # fmt: skip
     parts, plain_parts = [], []
     for part in ring_parts(solution, t, hollow, outer):
-        if len(part.plain):
+        if len(part.plain_cells):
             integrals = plain_ring(
-                part.plain, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
+                part.plain_cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
                 *simplex_rule(2, part.degree), tip.x, *ring,
                 change_in_cells(solution, t, part),
             )  # fmt: skip
-            plain_parts.append(GoalCells(part.plain, *integrals))
-        for at in part.others:
+            plain_parts.append(GoalCells(part.plain_cells, *integrals))
+        for at in part.other_points:
             points = at.points
             change = None
             if part.differs:
@@ -92,7 +92,7 @@ def constant(solution: Solution, t: int) -> Floats:
     total = np.zeros(2)
     if not has_effect([solution], "volume", "initial_stress"):
         return total
-    outer = domain_of(solution, t).outer
+    outer = domain_of(solution, t).outer_radius
     radii = np.array([outer])
     ring = ring_around([solution], t, radii)
     for cells, n, degree in ring_classes(space, space.tips[t].x, 0.0, outer):
@@ -182,7 +182,7 @@ def _singular_part(solution: Solution, t: int) -> tuple[Floats, Floats]:
     space, tip_material = solution.space, material_at_tip(solution, t)
     tip = space.tips[t]
     lips, R = solution.lips[tip.crack], tip.frame
-    radius = domain_of(solution, t).outer
+    radius = domain_of(solution, t).outer_radius
     outer = np.array([radius])
     values, gradients = np.zeros((2, len(lips), 2, 2)), np.zeros((2, len(lips), 2, 2, 2))
     way = lips.way_from(space.mesh, tip.x)

@@ -194,13 +194,13 @@ def _tip(solution: Solution, t: int, length: float) -> tuple[tuple[float, ...], 
     tip = solution.space.tips[t]
     body = _materials_beside(solution, t)
     domain = domain_of(solution, t)
-    room = _straight_radius(solution, t, domain.outer)
+    room = _straight_radius(solution, t, domain.outer_radius)
     if room < domain.size:
         raise GeometryError(
             f"the crack that ends at {at(tip.x)} on an interface does not run along it for a cell: "
             "let it end a cell before or behind, or follow the interface."
         )
-    scale = min(1.0, room / domain.outer)
+    scale = min(1.0, room / domain.outer_radius)
     radii = scale * radii_of(domain)
     K = 0.5 * body.modulus * _integrals(solution, t, body, radii, length)
     zone = _contact_zone(solution, t)

@@ -41,7 +41,7 @@ def draw(
         (picture.interfaces, "0.25", 0.7, 2.5),
         (picture.outline, "black", 0.9, 3),
         (picture.lips, "black", 0.9, 3),
-        (picture.closed, CLOSED, 2.2, 4),
+        (picture.closed_lips, CLOSED, 2.2, 4),
     ]
     for curves, color, width, level in lines:
         axes.add_collection(
@@ -50,7 +50,7 @@ def draw(
             )
         )
     _frame(axes, picture.box)
-    if len(picture.closed):
+    if len(picture.closed_lips):
         axes.plot([], [], color=CLOSED, lw=2.2, label="crack faces touch")
         _legend_below(axes, 1)
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}
@@ -58,7 +58,7 @@ def draw(
         mapped,
         ax=axes,
         label=picture.label,
-        extend=extend.get(picture.beyond, "both"),
+        extend=extend.get(picture.is_beyond, "both"),
         shrink=0.9,
         aspect=25,
     )

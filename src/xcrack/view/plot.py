@@ -206,17 +206,17 @@ def _draw_2d(
         raise ProblemError(
             f'plot(renderer="pyvista"): {fault}; or leave renderer out, and matplotlib draws it.'
         )
-    picture = replace(scene(solution, field, look.warp, look.limits), near=look.near)
+    picture = replace(scene(solution, field, look.warp, look.limits), focus_box=look.near)
     if renderer == "matplotlib" or fault:
         from xcrack.view import matplotlib_2d as plot_matplotlib
 
         return plot_matplotlib.draw(
-            picture, target, window, look.title, look.edges, look.colours(picture.signed)
+            picture, target, window, look.title, look.edges, look.colours(picture.has_sign)
         )
     from xcrack.view import pyvista_2d as plot_pyvista
 
     return plot_pyvista.draw(
-        picture, target, window, look.title, look.edges, look.colours(picture.signed)
+        picture, target, window, look.title, look.edges, look.colours(picture.has_sign)
     )
 
 
@@ -254,7 +254,7 @@ def _draw_3d(
         picture = space_scene(solution, field, look.warp, look.limits, look.plane, look.view)
     if look.near is not None:
         corners = np.stack(np.meshgrid(*look.near.T), axis=-1).reshape(-1, 3)
-        picture = replace(picture, near=corners)
+        picture = replace(picture, focus_points=corners)
     arrows = None
     if look.loads:
         from xcrack.view.scene_3d import load_arrows
@@ -263,7 +263,7 @@ def _draw_3d(
     from xcrack.view.pyvista_3d import draw_space
 
     edges = look.edges or field == "mesh"
-    colours = look.colours(picture.signed)
+    colours = look.colours(picture.has_sign)
     return draw_space(picture, arrows, target, window, look.title, edges, colours)
 
 

@@ -97,7 +97,7 @@ def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[in
     )
     width, height = window
     add_bar(plotter, actor, picture.label, picture.limits, window)
-    if len(picture.closed):
+    if len(picture.closed_lips):
         plotter.add_text(
             "crack faces touch",
             position=(1 - BAR / width, 30 / height),
@@ -171,7 +171,7 @@ def _add_lines(pv: Any, plotter: Any, picture: Scene, edges: bool, step: float) 
         (picture.interfaces, "#404040", 1.8, 1.5),
         (picture.outline, "black", 2.5, 2),
         (picture.lips, "black", 2.5, 2),
-        (picture.closed, CLOSED, 5.0, 3),
+        (picture.closed_lips, CLOSED, 5.0, 3),
     ]
     for curves, color, width, level in lines:
         if len(curves):

@@ -41,7 +41,7 @@ def draw_space(
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
     pv = require_package("pyvista", 'plot(renderer="pyvista")')
-    right, up, toward = _axes(picture.toward)
+    right, up, toward = _axes(picture.view_direction)
     box = picture.box if arrows is None else picture.body
     if arrows is not None:
         box = np.concatenate([box, arrows[0], arrows[0] + arrows[1]])
@@ -153,7 +153,7 @@ def _add_faces(
         actor.prop.interpolation = "phong"
         bottom = max(0.1, (_LEGEND * (len(_legend(picture)) + 1.2)) / window[1])
         add_bar(plotter, actor, picture.label, picture.limits, window, bottom, top)
-    for corners, color in ((picture.touching, CLOSED), (picture.apart, _APART)):
+    for corners, color in ((picture.closed_faces, CLOSED), (picture.open_faces, _APART)):
         if len(corners):
             plotter.add_mesh(_surface(pv, corners), color=color, **_LIGHT)
     if len(picture.skin):
@@ -167,7 +167,7 @@ _LIGHT = {"ambient": 0.55, "diffuse": 0.5, "specular": 0.0}
 def _add_lines(pv: Any, plotter: Any, picture: SpaceScene, edges: bool, step: Floats) -> None:
     nothing = picture.cell_edges[:0]
     lines = [
-        (picture.faint, "#a5a9ae", 1.5, 0),
+        (picture.faint_lines, "#a5a9ae", 1.5, 0),
         (picture.cell_edges if edges else nothing, "#303030", 1.0, 1),
         (picture.outline, "#404040" if len(picture.skin) else "black", 2.0, 1.5),
         (picture.rims, "black", 2.5, 2),
@@ -212,8 +212,8 @@ def _legend(picture: SpaceScene) -> list[tuple[str, str]]:
     """Words of the legend and their colours."""
     crack = "crack" if len(picture.heaviside) else "crack faces touch"
     entries = [
-        (len(picture.touching), crack, CLOSED),
-        (len(picture.apart), "crack faces apart", "#8d9299"),
+        (len(picture.closed_faces), crack, CLOSED),
+        (len(picture.open_faces), "crack faces apart", "#8d9299"),
         (len(picture.fronts), "front", _FRONT),
         (len(picture.heaviside), "Heaviside", "#1f77b4"),
         (len(picture.tip), "tip functions", "#ff7f0e"),

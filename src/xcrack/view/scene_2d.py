@@ -48,14 +48,14 @@ class Scene:
         What the colour bar says.
     limits : (float, float)
         Ends of the colours.
-    beyond : (bool, bool)
+    is_beyond : (bool, bool)
         Whether values lie below or above the colours.
-    signed : bool
+    has_sign : bool
         The field has a sign: its colours part at zero.
-    outline, lips, closed, cell_edges, at_rest, interfaces : (k, 3, 2) arrays, length
+    outline, lips, closed_lips, cell_edges, at_rest, interfaces : (k, 3, 2) arrays, length
         Edges as three points: of the body, of open crack faces, of closed crack faces, between
         cells of the mesh, of the body that has not moved, and between materials.
-    near : (2, 2) array, length, optional
+    focus_box : (2, 2) array, length, optional
         Box to show instead of the whole body.
     """
 
@@ -64,21 +64,21 @@ class Scene:
     values: Floats
     label: str
     limits: tuple[float, float]
-    beyond: tuple[bool, bool]
-    signed: bool
+    is_beyond: tuple[bool, bool]
+    has_sign: bool
     outline: Floats
     lips: Floats
-    closed: Floats
+    closed_lips: Floats
     cell_edges: Floats
     at_rest: Floats
     interfaces: Floats
-    near: Floats | None = None
+    focus_box: Floats | None = None
 
     @property
     def box(self) -> Floats:
         """Lowest and highest coordinates of what is drawn `(2, 2)`, length."""
-        if self.near is not None:
-            return self.near
+        if self.focus_box is not None:
+            return self.focus_box
         x = np.concatenate([self.points, self.at_rest.reshape(-1, 2)])
         return np.stack([x.min(axis=0), x.max(axis=0)])
 
@@ -118,14 +118,14 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
         values=values,
         label=label,
         limits=(low, high),
-        beyond=(
+        is_beyond=(
             bool(values.min() < low - 1e-9 * (high - low)),
             bool(values.max() > high + 1e-9 * (high - low)),
         ),
-        signed=low < 0 < high,
+        has_sign=low < 0 < high,
         outline=outline,
         lips=curve[lip & ~closed],
-        closed=curve[lip & closed],
+        closed_lips=curve[lip & closed],
         cell_edges=curve[on_facet & ~lip & ~rim],
         at_rest=rest,
         interfaces=curve[between & ~lip],

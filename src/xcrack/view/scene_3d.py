@@ -60,21 +60,21 @@ class SpaceScene:
         What the colour bar says; empty where nothing is coloured by a field.
     limits : (float, float)
         Ends of the colours.
-    signed : bool
+    has_sign : bool
         The field has a sign: its colours part at zero.
-    touching, apart : (k, 3, 3) arrays, length
+    closed_faces, open_faces : (k, 3, 3) arrays, length
         Triangles of a crack that are not coloured: its faces touch there, or do not.
     skin : (s, 3, 3) array, length
         Surface of a body that is seen through.
-    outline, cell_edges, faint, rims, fronts : (k, 2, 3) arrays, length
+    outline, cell_edges, faint_lines, rims, fronts : (k, 2, 3) arrays, length
         Lines: sharp edges of the body and its section, edges of cells, what is only hinted at
         (the body that has not moved, the edges of cells behind the rest), edges of the crack faces,
         fronts.
-    toward : (3,) array
+    view_direction : (3,) array
         Unit vector from the body to the viewer.
     heaviside, tip : (k, 3) arrays, length
         Points that carry these functions.
-    near : (k, 3) array, length, optional
+    focus_points : (k, 3) array, length, optional
         Points that have to be in the picture instead of the whole body.
     """
 
@@ -82,29 +82,29 @@ class SpaceScene:
     values: Floats
     label: str
     limits: tuple[float, float]
-    signed: bool
-    touching: Floats
-    apart: Floats
+    has_sign: bool
+    closed_faces: Floats
+    open_faces: Floats
     skin: Floats
     outline: Floats
     cell_edges: Floats
-    faint: Floats
+    faint_lines: Floats
     rims: Floats
     fronts: Floats
-    toward: Floats
+    view_direction: Floats
     heaviside: Floats
     tip: Floats
-    near: Floats | None = None
+    focus_points: Floats | None = None
 
     @property
     def box(self) -> Floats:
         """Points that have to be in the picture `(k, 3)`, length: a small crack fills it."""
-        if self.near is not None:
-            return self.near
+        if self.focus_points is not None:
+            return self.focus_points
         body = self.body
         if not len(self.skin) or len(self.heaviside):
             return body
-        parts = (self.triangles, self.touching, self.apart)
+        parts = (self.triangles, self.closed_faces, self.open_faces)
         x = np.concatenate([part.reshape(-1, 3) for part in parts])
         low, high = x.min(axis=0), x.max(axis=0)
         size = float((high - low).max())
@@ -116,7 +116,7 @@ class SpaceScene:
     @property
     def body(self) -> Floats:
         """Points of all that is drawn `(k, 3)`, length."""
-        parts = (self.triangles, self.touching, self.skin, self.outline, self.faint)
+        parts = (self.triangles, self.closed_faces, self.skin, self.outline, self.faint_lines)
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
@@ -200,16 +200,16 @@ def space_scene(
         values=values,
         label=label_of(body, field) + (f", clipped at {int(10 * share) / 10:g} %" if clip else ""),
         limits=(low, high),
-        signed=low < 0 < high,
-        touching=nothing,
-        apart=nothing,
+        has_sign=low < 0 < high,
+        closed_faces=nothing,
+        open_faces=nothing,
         skin=nothing,
         outline=curves[0],
         cell_edges=curves[2],
-        faint=outline_rest if warp else np.zeros((0, 2, 3)),
+        faint_lines=outline_rest if warp else np.zeros((0, 2, 3)),
         rims=curves[1],
         fronts=_front_lines(solution, warp, plane)[: None if plane is not None else 0],
-        toward=_viewing_direction(plane, view, None),
+        view_direction=_viewing_direction(plane, view, None),
         heaviside=np.zeros((0, 3)),
         tip=np.zeros((0, 3)),
     )
@@ -272,12 +272,12 @@ def crack_scene(
         values=values[coloured],
         label=LIP_FIELDS[field],
         limits=(low, high),
-        signed=low < 0 < high,
-        touching=nothing if field == "pressure" else corners[~coloured],
-        apart=corners[~coloured] if field == "pressure" else nothing,
+        has_sign=low < 0 < high,
+        closed_faces=nothing if field == "pressure" else corners[~coloured],
+        open_faces=corners[~coloured] if field == "pressure" else nothing,
         rims=np.concatenate([_middle_of_lips(each, warp)[each.mouth] for each in lips]),
         cell_edges=edges_of(corners),
-        toward=_viewing_direction(plane, view, lips),
+        view_direction=_viewing_direction(plane, view, lips),
     )
 
 
@@ -296,9 +296,9 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
     every = np.concatenate([np.zeros((0, 3, 3)), *corners])
     return replace(
         through,
-        touching=every,
+        closed_faces=every,
         cell_edges=edges_of(every),
-        toward=_viewing_direction(plane, view, lips),
+        view_direction=_viewing_direction(plane, view, lips),
         heaviside=space.node_points[carries],
         tip=space.mesh.points[around],
     )
@@ -333,16 +333,16 @@ def _seen_through(
         values=np.zeros((0, 3)),
         label="",
         limits=(0.0, 1.0),
-        signed=False,
-        touching=np.zeros((0, 3, 3)),
-        apart=np.zeros((0, 3, 3)),
+        has_sign=False,
+        closed_faces=np.zeros((0, 3, 3)),
+        open_faces=np.zeros((0, 3, 3)),
         skin=skin,
         outline=outline,
         cell_edges=empty,
-        faint=np.concatenate(faint) if with_cells else empty,
+        faint_lines=np.concatenate(faint) if with_cells else empty,
         rims=empty,
         fronts=_front_lines(solution, warp, None),
-        toward=np.array([0.0, -1.0, 0.0]),
+        view_direction=np.array([0.0, -1.0, 0.0]),
         heaviside=np.zeros((0, 3)),
         tip=np.zeros((0, 3)),
     )

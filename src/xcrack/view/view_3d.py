@@ -33,7 +33,7 @@ def solution_layers(solution: Solution) -> list[dict[str, Any]]:
         layers += [
             _layer("crack: opening", "triangles", lips.triangles,
                    _coloured_layer(lips.values, lips.limits), 1.0),
-            _layer("crack: faces that touch", "triangles", lips.touching, (110, 110, 110), 1.0),
+            _layer("crack: faces that touch", "triangles", lips.closed_faces, (110, 110, 110), 1.0),
             _layer("fronts", "lines", lips.fronts, _FRONT, 1.0),
         ]  # fmt: skip
     return [layer for layer in layers if layer["n"]]

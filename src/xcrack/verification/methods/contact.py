@@ -127,7 +127,7 @@ class Springs(Declared, ContactMethod):
     def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
         """Stiffness and rows of the iteration."""
         c = rows.eps * rows.measure
-        return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.reduced)
+        return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.basis_matrix)
 
     def solution(
         self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
@@ -177,7 +177,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
     def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """Groups of points, as multipliers have them."""
         kind = problem.numerics.multipliers
-        return multipliers(model.space, c, model.lips[c], kind, model.known.fixed)
+        return multipliers(model.space, c, model.lips[c], kind, model.known.is_fixed)
 
     def rows(self, problem: Problem, model: System, m: Multipliers) -> "Rows":
         """Weak gaps of the groups."""
@@ -190,7 +190,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
     def system(self, engine: DirectSystem, rows: "Rows") -> "ClosedSystem":
         """Springs on weak gaps."""
         c = rows.eps / rows.measure
-        return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.reduced)
+        return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.basis_matrix)
 
     def solution(
         self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
@@ -248,7 +248,7 @@ class nitsche(Springs):  # noqa: N801
         R = sp.csr_matrix(rows.stress + sp.diags(rows.eps) @ rows.jump)
         own = sp.csr_matrix(rows.stress @ engine.basis)
         K = sp.csr_matrix(engine.matrix - rows.stress.T @ sp.diags(c) @ rows.stress)
-        reduced = sp.csc_matrix(engine.reduced - own.T @ sp.diags(c) @ own)
+        reduced = sp.csc_matrix(engine.basis_matrix - own.T @ sp.diags(c) @ own)
         return ClosedSystem(engine, K, R, c, reduced)
 
     def solution(
