@@ -64,7 +64,7 @@ def test_contours_at_rest(order):
     inside = (0.083 + 1) * np.hypot(1, 0.017 / 1.283)
     assert length(picture.outline) == pytest.approx(8, rel=1e-12)
     assert length(picture.lips) == pytest.approx(2 * inside, rel=1e-12)
-    assert len(picture.closed) == 0
+    assert len(picture.closed_lips) == 0
     assert area(picture) == pytest.approx(4, rel=1e-12)
 
 
@@ -92,7 +92,7 @@ def test_the_crack_opens_with_the_warp(pulled):
 def test_closed_lips_look_different(pressed):
     picture = scene(pressed, "von_mises", 0.0, None)
     assert len(picture.lips) == 0
-    assert length(picture.closed) == pytest.approx(2 * 1.083 * np.hypot(1, 0.01325), rel=1e-4)
+    assert length(picture.closed_lips) == pytest.approx(2 * 1.083 * np.hypot(1, 0.01325), rel=1e-4)
 
 
 def test_cell_edges_are_those_of_the_mesh(pulled):
@@ -279,7 +279,7 @@ def test_partial_contact_shades_the_closed_part_only():
     # Half a distance of points at each end.
     assert width == pytest.approx(s[closed].max() - s[closed].min(), abs=0.1)
     picture = scene(solution, "von_mises", 0.0, None)
-    assert length(picture.closed) == pytest.approx(2 * width, abs=0.2)
+    assert length(picture.closed_lips) == pytest.approx(2 * width, abs=0.2)
     assert len(picture.lips) > 0
 
 

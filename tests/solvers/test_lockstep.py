@@ -58,7 +58,7 @@ def test_matrices_made_by_threads_have_the_same_bits(monkeypatch):
             shared, other, forces = made()
         for name in ("indptr", "indices", "data"):
             assert np.array_equal(getattr(shared, name), getattr(alone, name))
-        for name in ("first", "start", "offset", "columns", "values"):
+        for name in ("first_row", "start", "offset", "columns", "values"):
             assert np.array_equal(getattr(other, name), getattr(blocks, name))
         assert forces.tobytes() == image.tobytes()
 

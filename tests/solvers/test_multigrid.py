@@ -41,7 +41,7 @@ def test_a_matrix_in_parts():
     first = np.array([0, 3, 4, 8])
     lower = row_blocks(below, np.array([0, 4]))
     joined = row_blocks([sp.csr_matrix(sp.hstack(below))], np.array([0, 4]))
-    for name in ("shape", "first", "start", "offset", "columns", "values"):
+    for name in ("shape", "first_row", "start", "offset", "columns", "values"):
         assert np.array_equal(getattr(lower, name), getattr(joined, name)), name
     A = BorderedFactor(row_blocks([standard], first), row_blocks([across], first), lower)
     whole = sp.vstack([sp.hstack([standard, across]), sp.hstack(below)])
@@ -63,7 +63,7 @@ def test_blocks_are_stored_without_a_matrix_in_between(size):
         for dtype in (np.float32, np.float64):
             ours, wanted = store_blocks(M, dtype), row_blocks([M.tocsr()], first, dtype)
             assert ours.shape == wanted.shape
-            for name in ("first", "start", "offset", "columns", "values"):
+            for name in ("first_row", "start", "offset", "columns", "values"):
                 result, other = getattr(ours, name), getattr(wanted, name)
                 assert result.dtype == other.dtype
                 np.testing.assert_array_equal(result, other)

@@ -42,7 +42,7 @@ class FrontChain:
     owner: Ints
 
     def __post_init__(self) -> None:
-        for name in ("x", "pinned", "start", "stop", "still", "owner"):
+        for name in ("x", "is_pinned", "start", "stop", "is_at_rest", "owner"):
             object.__setattr__(self, name, frozen_copy(getattr(self, name)))
 
     @property

@@ -158,8 +158,8 @@ class WarningLog:
         if not again:
             return
         lines = [
-            f"in {kind.steps} of {self.n_steps} steps, from step {kind.first_step} to {kind.last_step}, "
-            f"where it was: {kind.message}"
+            f"in {kind.steps} of {self.n_steps} steps, from step {kind.first_step} to "
+            f"{kind.last_step}, where it was: {kind.message}"
             for kind in again
         ]
         warn(

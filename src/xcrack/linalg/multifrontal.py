@@ -177,8 +177,8 @@ class Factor:
         tree = self.tree
         with one_blas_thread():
             substitute(
-                self.first_unknown, self.begin, self.boundary, tree.postorder, tree.rank, self.panel, X,
-                touched, forward, backward,
+                self.first_unknown, self.begin, self.boundary, tree.postorder, tree.rank,
+                self.panel, X, touched, forward, backward,
             )  # fmt: skip
         return X
 

@@ -146,8 +146,9 @@ def scale_of(solution: Solution, part: SIF, radius: float) -> float:
 
 def _clipped_K(domain: Domain) -> str:
     text = (
-        f"the domain is clipped to {domain.outer_radius:.4g} ({domain.outer_radius / domain.size:.1f} cells) by "
-        "the boundary, another tip or crack, or a bend of the front"
+        f"the domain is clipped to {domain.outer_radius:.4g} "
+        f"({domain.outer_radius / domain.size:.1f} cells) by the boundary, "
+        "another tip or crack, or a bend of the front"
     )
     if domain.room < domain.least_room:
         return f"{text}, and errors are small from {domain.least_room / domain.size:.3g} cells on"

@@ -59,8 +59,8 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     for part in ring_parts(solution, t, hollow, outer):
         if len(part.plain_cells):
             integrals = plain_ring(
-                part.plain_cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side, psi,
-                *simplex_rule(2, part.degree), tip.x, *ring,
+                part.plain_cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side,
+                psi, *simplex_rule(2, part.degree), tip.x, *ring,
                 change_in_cells(solution, t, part),
             )  # fmt: skip
             plain_parts.append(GoalCells(part.plain_cells, *integrals))

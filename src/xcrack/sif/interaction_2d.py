@@ -137,7 +137,7 @@ def change_in_cells(solution: Solution, t: int, part: Any) -> Floats | None:
     """
     if not part.differs:
         return None
-    bary, cells = simplex_rule(2, part.degree)[0], part.plain
+    bary, cells = simplex_rule(2, part.degree)[0], part.plain_cells
     if not solution.problem.elasticity.is_graded:
         bary = bary[:1]
     points = np.repeat(cells, len(bary)), np.tile(bary, (len(cells), 1))
@@ -153,8 +153,8 @@ def plain_terms(solutions: Sequence[Solution], ring: IntegrationRing, part: Any)
     cut, edges = space.cuts[tip.crack], local_edges(2)
     result = np.zeros((len(solutions), len(ring.radii), 3))
     add_plain_cells(
-        result, part.plain, mesh.points, mesh.cells, mesh.gradient, mesh.volume, space.cell_nodes,
-        edges if space.order == 2 else edges[:0], ring.coefficients, cut.side,
+        result, part.plain_cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume,
+        space.cell_nodes, edges if space.order == 2 else edges[:0], ring.coefficients, cut.side,
         cut.level_set.psi[tip.number], *simplex_rule(2, part.degree),
         *_constants(solutions[0], ring), change_in_cells(solutions[0], ring.t, part),
     )  # fmt: skip
