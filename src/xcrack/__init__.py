@@ -156,6 +156,7 @@ _HOME = {
     "validate": "verification.experiments.validate",
     "report": "view.report",
     "read_case": "app.case",
+    "write_case": "app.case_writing",
     "sweep": "app.sweep",
     "run": "app.case_run",
     "info": "app.info",

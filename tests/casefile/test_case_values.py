@@ -207,15 +207,16 @@ check chart cycles_between compliance convert_mesh crack_opening demo draw_K dra
 energy_error energy_release_rate equivalent_K geometry_factors growth_curve info inf_sup
 interface_intensity
 materials measures opening_load plan plot plot_rates plot_spectrum plot_strength presets rainflow
-respond retarded solve stress_intensities stress_intensity validate verify
-campaign collect grid load read_case report resume run save sweep write write_factors write_mesh
+respond solve stress_intensities stress_intensity validate verify
+campaign collect grid load read_case report resume run save sweep write write_case write_factors
+write_mesh
 """.split()
 KEYS = """
 grow Cycle Spectrum read_spectrum twist wheeler willenborg plastic_zone pardiso max_hoop_stress
 mean_reference weighted_angle life lognormal normal inspection logistic_pod residual_strength
 assessment_line handbook Numerics adapt read_deck refine part read_field law material time_rate
 nasgro_K_c mesh_step read_mesh read_surface
-K_gradient K_over_size load_over_cycles load_over_size
+K_gradient K_over_size load_over_cycles load_over_size retarded
 """.split()  # functions that a section or key stands for
 MAKERS = {"line_crack", "penny_crack", "elliptic_crack", "plane_crack", "surface_crack"}
 

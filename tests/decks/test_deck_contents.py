@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support.decks import STEEL, box_cases, box_deck, deck_text, simplices
+from support.decks import ARCHIVE, STEEL, box_cases, box_deck, deck_text, simplices
 
 ASSEMBLY = Path(__file__).parents[1] / "data" / "assembly.inp"
 pytestmark = pytest.mark.filterwarnings("ignore:.*are (divided|left out)")
@@ -234,28 +234,6 @@ def test_other_programs_give_mesh_and_table(tmp_path):
     with pytest.raises(xc.ProblemError, match=r"has no material.*problem\(material="):
         deck.problem()
     assert deck.problem(material=xc.Isotropic(1.0, 0.3)).mesh is deck.mesh
-
-
-ARCHIVE = """/PREP7
-ET,1,185
-NBLOCK,6,SOLID,         8,         8
-(3i9,6e21.13e3)
-{nodes}N,R5.3,LOC,       -1,
-EBLOCK,19,SOLID,         1,         1
-(19i9)
-        1        1        1        1        0        0        0        0        8        0        5        1        2        3        4        5        6        7        8
-       -1
-CMBLOCK,TOP     ,NODE,       2  ! users node component definition
-(8i10)
-         5        -8
-CMBLOCK,WHOLE   ,ELEM,       1  ! users element component definition
-(8i10)
-         5
-MPTEMP,R5.0, 1, 1,  0.0
-ACEL,  0.0, 0.0, 0.0
-F,5,FX,10.
-FINISH
-"""  # noqa: E501
 
 
 def test_an_archive_of_ansys(tmp_path):

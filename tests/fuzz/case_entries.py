@@ -14,6 +14,7 @@ from fuzz.kinds import (
     Flag,
     Kind,
     Number,
+    Of,
     Seen,
     Word,
 )
@@ -175,6 +176,28 @@ ENTRIES = [
         in_folder=True,
         arity=False,
         cost=0.05,
+    ),
+    Entry(
+        "write_case",
+        lambda **named: xc.write_case(**{"path": "w.toml", "problem": scenes.growing()} | named),
+        {
+            "path": arg(
+                Filename(rule=lambda v: None), "w.toml", near=paths(".toml", ""), words=["file"]
+            ),
+            "problem": arg(Of(type=xc.Problem), Late(scenes.problem)),
+            "states": arg(
+                Seen(rule=lambda v: v is None or (None if isinstance(v, list | tuple) else False)),
+                None,
+                [0.0, 1.0],
+                words=["states", "state"],
+            ),
+            "title": arg(Word(), "a"),
+            "until": arg(Seen(rule=lambda v: v is None), None),
+            "tolerance": arg(Number(above=0, below=1, optional=True), None, 0.1),
+        },
+        in_folder=True,
+        cost=0.1,
+        share=0.2,
     ),
     Entry(
         "sweep",

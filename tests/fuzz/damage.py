@@ -23,6 +23,7 @@ from fuzz.case_entries import CASE, TOML
 from fuzz.entry import Input
 from fuzz.kinds import EDGE
 from fuzz.outcome import BAD, GOOD, Outcome, outcome_of
+from support.decks import ARCHIVE, box_cases
 
 DATA = Path(__file__).parents[1] / "data"
 GROWTH = """
@@ -176,6 +177,166 @@ def decks(rng):
         return result.mesh if isinstance(result, xc.Deck) else result
 
     return f"a deck for {read.__name__}", call
+
+
+_PULL = """
+[[loads]]
+kind = "traction"
+where = "top"
+value = [0.0, "80 MPa"]
+[[loads]]
+kind = "traction"
+where = "bottom"
+value = [0.0, "-80 MPa"]
+"""
+_ASSESSED = """
+[growth]
+law = { kind = "metal", name = "2024-T3 sheet, L-T" }
+criterion = { kind = "mean_reference", reference = "max" }
+da = "1 mm"
+until = "right"
+[growth.spectrum]
+factors = [0.0, 1.0, 0.4, 0.9, 0.0, 0.6]
+unit = "flight"
+least_range = 0.05
+[growth.retardation]
+kind = "wheeler"
+w = 1.2
+zone = { sigma_y = "350 MPa", beta = 2 }
+[[retarded]]
+kind = "willenborg"
+shutoff = 2.5
+dK_th = 60.0
+zone = { sigma_y = "350 MPa", beta = 2 }
+[life]
+seed = 3
+samples = 400
+[life.scatter]
+C = { kind = "lognormal", sigma = 0.3 }
+a0 = { kind = "normal", sigma = 0.1 }
+[inspection]
+a_detect = "8 mm"
+factor = 3
+pod = { a50 = "5 mm", s = 0.3 }
+[strength]
+K_c = "30 MPa*sqrt(m)"
+resistance = { da = [0.0, 5.0], K = [900.0, 1500.0] }
+"""
+_TABLED = """
+[growth]
+cycle = { states = [0.0, [{ kind = "traction", where = "top", value = [0.0, "90 MPa"] }]] }
+tolerance = 0.02
+link_up = { sigma_y = "350 MPa", beta = 2 }
+load_program = { kind = "load_over_size", function = [[2.0, 1.0], [9.0, 0.5]] }
+[growth.law]
+kind = "rate_table"
+curves = [{ R = 0.0, dK = [200, 900], rate = [1e-6, 1e-4] }]
+outside = "nearest"
+[output]
+folder = "results"
+pictures = ["von_mises"]
+[numerics]
+points = 6
+"""
+_SPECIMEN = """
+title = "Compact specimen"
+[units]
+length = "mm"
+force = "N"
+[specimen]
+kind = "middle_tension"
+W = 50.0
+a = 12.0
+size = 4.0
+[material]
+kind = "metal"
+name = "7075-T6 plate, L-T"
+plane = "strain"
+[[handbook]]
+kind = "middle"
+W = 25.0
+a = 6.0
+S = 1.0
+[solve]
+states = [0.0, 1.0]
+error = true
+[growth]
+law = { kind = "preset", name = "BS 7910 steel in air, mean" }
+cycle = { min = 0.1, max = 1.0 }
+da = 1.0
+"""
+_OF_DECK = """
+[deck]
+path = "deck.inp"
+step = 1
+[[cracks]]
+kind = "line"
+points = [[-0.1, 0.5], [0.4, 0.5]]
+[[supports]]
+kind = "fix"
+where = [0.0, 0.0]
+[[mesh_free]]
+"""
+
+
+def full_cases(rng):
+    """Case files that use all tables."""
+    plate = CASE.format(**TOML).replace("[solve]", _PULL + "[solve]")
+    base = [plate + _ASSESSED, plate + _TABLED, _SPECIMEN, _OF_DECK.replace("[[mesh_free]]\n", "")]
+    content = mutated_text(rng, base[int(rng.integers(len(base)))])
+
+    def call():
+        written("deck.inp", _decks()["CPE3_cload"])
+        return xc.read_case(written("case.toml", content)).problem.mesh
+
+    return "a case file of all tables", call
+
+
+@cache
+def _decks():
+    """Decks with loads and supports of many kinds, of three programs."""
+    texts = {name: text for dim in (2, 3) for name, text in box_cases(dim, 1).items()}
+    with scenes.folder() as folder:
+        body = folder / "body.bdf"
+        import meshio
+
+        mesh = xc.box((0, 0, 0), (1, 1, 1), 1)
+        meshio.Mesh(mesh.points, [("tetra", mesh.cells)]).write(body)
+        texts["bdf"] = body.read_text()
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    corners += [(x, y, 2) for x, y, _ in corners]
+    texts["cdb"] = ARCHIVE.format(nodes="".join(
+        f"{n:9d}{0:9d}{0:9d}{x:21.13E}{y:21.13E}{z:21.13E}\n"
+        for n, (x, y, z) in enumerate(corners, 1)
+    ))  # fmt: skip
+    return texts
+
+
+def full_decks(rng):
+    """Decks of three programs: to a problem, or a refusal."""
+    texts = _decks()
+    name = str(rng.choice([*texts, "cdb", "cdb", "bdf", "bdf"]))
+    content = mutated_text(rng, texts[name])
+    ending = name if name in ("cdb", "bdf") else "inp"
+
+    def call():
+        deck = xc.read_deck(written(f"deck.{ending}", content))
+        plane = None if deck.mesh.dim == 3 else "strain"
+        return deck.problem(material=xc.Isotropic(1.0, 0.3, plane)).mesh
+
+    return f"a deck {name}", call
+
+
+_HEADED = "time;factor;note\n" + "\n".join(f"{k};{(k % 5) / 4 - 0.2:.3f};{k}" for k in range(20))
+_COUNTED = "# min max count\n" + "\n".join(f"{0.05 * k:.2f}, 1.0, {10 * k + 1}" for k in range(12))
+
+
+def tables(rng):
+    """Load histories and counted cycles as tables."""
+    counted = bool(rng.random() < 0.5)
+    content = mutated_text(rng, _COUNTED if counted else _HEADED)
+    given = {"rows": True} if counted else {"column": 1}
+    return "a table", lambda: xc.read_spectrum(written("s.csv", content), **given).cycles["max"]
 
 
 _MESHES = (
@@ -395,6 +556,7 @@ def reports(rng):
 
 
 CLASSES = {
+    full_cases: 400, full_decks: 300, tables: 150,
     case_files: 300, saved_files: 200, run_folders: 150, campaign_rows: 200, decks: 250,
     meshes: 150, spectra: 120, surfaces: 80, pipes: 40, sizes: 60, depth: 40, outside: 60,
     threads: 15, step_files: 8, reports: 12,

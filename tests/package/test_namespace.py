@@ -38,6 +38,7 @@ NAMES = [
     "time_rate", "with_time",
     # verification, reports, files of scenes
     "verify", "validate", "report", "read_case", "run", "sweep", "info", "demo", "convert_mesh",
+    "write_case",
     # what users derive from
     "Closure", "GrowthLaw", "Load", "LoadProgram", "Material", "Threshold",
     # campaigns

@@ -214,3 +214,26 @@ def main() -> None:
 
 if __name__ == "__main__":
     main()
+
+
+# An archive of Ansys, as CDWRITE makes it.
+ARCHIVE = """/PREP7
+ET,1,185
+NBLOCK,6,SOLID,         8,         8
+(3i9,6e21.13e3)
+{nodes}N,R5.3,LOC,       -1,
+EBLOCK,19,SOLID,         1,         1
+(19i9)
+        1        1        1        1        0        0        0        0        8        0        5        1        2        3        4        5        6        7        8
+       -1
+CMBLOCK,TOP     ,NODE,       2  ! users node component definition
+(8i10)
+         5        -8
+CMBLOCK,WHOLE   ,ELEM,       1  ! users element component definition
+(8i10)
+         5
+MPTEMP,R5.0, 1, 1,  0.0
+ACEL,  0.0, 0.0, 0.0
+F,5,FX,10.
+FINISH
+"""  # noqa: E501

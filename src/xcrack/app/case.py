@@ -12,7 +12,7 @@ import numpy as np
 from xcrack.adaptivity.adapt import adapt
 from xcrack.analysis.solve import solve
 from xcrack.app import case_values as values
-from xcrack.app.case_assessment import inspection_of, life_of, strength_of
+from xcrack.app.case_assessment import inspection_of, life_of, retarded_of, strength_of
 from xcrack.app.case_histories import load_states, loading, retardation_of
 from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.arguments import FileName, arguments_of, check_arguments
@@ -25,7 +25,7 @@ from xcrack.fatigue.load_program import LoadProgram
 from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowthOptions, GrowthRule
 from xcrack.linalg.direct import pardiso
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.mesh.parts import part, selector
 from xcrack.mesh.refinement import refine
 from xcrack.model.deck import read_deck
@@ -34,10 +34,12 @@ from xcrack.model.material import Isotropic, Material, MaterialSets
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Support
+from xcrack.runs.collect import names_of_sets
 
 _BODIES = ("mesh", "deck", "specimen")  # of which a file has one
 _SECTIONS = ("title", "units", *_BODIES, "material", "cracks", "supports", "loads", "handbook",
-             "solve", "numerics", "growth", "life", "inspection", "strength", "output")  # fmt: skip
+             "solve", "numerics", "growth", "life", "retarded", "inspection", "strength",
+             "output")  # fmt: skip
 _MORE_OF_MESH = ("refine", "parts", "cell_sets")  # beside the arguments of what makes it
 _CHOICES = ("contact", "order", "friction")  # of the problem
 _SOLVING = ("error", "solver", "tolerance", "max_unknowns")  # of solve and adapt
@@ -51,10 +53,10 @@ _TABLES = (
     "load_program",
 )  # of growth
 _OUTPUT = ("folder", "pictures", "warp", "keep_solutions")
-_METHODS = ("contact_method", "tip_basis", "level_sets")  # of numerics, to compare with
+METHODS = ("contact_method", "tip_basis", "level_sets")  # of numerics, to compare with
 _REST = "rest"  # of the cells: those in no box
 _FUNCTIONS = ("response",)  # options of growth that a script alone can give
-_SOLVERS = {"pardiso": pardiso}
+SOLVERS = {"pardiso": pardiso}
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,8 +83,10 @@ class CaseFile:
     life, inspection, strength : mapping, optional
         Arguments of `life`, `inspection` and `residual_strength` beside the history; None where
         they are not asked for.
-    keep_solutions : bool
+    keep_solutions, until : optional
         As of `collect`.
+    retarded : tuple of mapping
+        Arguments of `retarded` beside history, law and spectrum, one for each model.
     units : str, optional
         Force, length and stress of the file, as `report` takes them.
     """
@@ -100,6 +104,8 @@ class CaseFile:
     inspection: Mapping[str, Any] | None = None
     strength: Mapping[str, Any] | None = None
     keep_solutions: bool = True
+    until: tuple[str, ...] | None = None
+    retarded: tuple[Mapping[str, Any], ...] = ()
     units: str | None = None
 
 
@@ -135,7 +141,7 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
     solving, output = root.table("solve"), root.table("output")
     output.known(_OUTPUT)
     growth = _growth(root.table("growth")) if "growth" in root else None
-    for name in ("life", "inspection", "strength"):
+    for name in ("life", "retarded", "inspection", "strength"):
         if name in root and growth is None:
             root.refuse(name, "it is of a growth run: give the table [growth] too.")
     units = root.source.units
@@ -155,6 +161,10 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
         if growth and "strength" in root
         else None,
         keep_solutions=_flag(output, "keep_solutions", True),
+        until=_until(root.table("growth"), problem.mesh),
+        retarded=tuple(retarded_of(each, problem, growth) for each in root.tables("retarded"))
+        if growth
+        else (),
         units=f"{units.force}, {units.length}, {units.stress}" if units.stress else None,
     )
 
@@ -276,7 +286,7 @@ def _is_one(table: Table, kind: type) -> bool:
 
 def _numerics(table: Table) -> Numerics:
     """Choices of method; those for comparison stay in scripts."""
-    names = [f.name for f in fields(Numerics) if f.name not in _METHODS]
+    names = [f.name for f in fields(Numerics) if f.name not in METHODS]
     table.known(names)
     return values.called_with(table, Numerics)  # type: ignore[no-any-return]
 
@@ -322,13 +332,13 @@ def _growth(table: Table) -> Mapping[str, Any]:
             table.refuse(
                 name, f"it is a function: a script gives it, grow(case.problem, {name}=...)."
             )
-    table.known(("law", "criterion", "cycle", "spectrum", "da", *options))
+    table.known(("law", "criterion", "cycle", "spectrum", "da", "until", *options))
     if "law" not in table:
         table.refuse("", "the key 'law' is missing: give it.")
     given = {
         name: values.argument_of(table, name, GrowthRule)
         for name in table.content
-        if name not in _TABLES and name != "solver"
+        if name not in _TABLES and name not in ("solver", "until")
     }
     if "solver" in table:
         given["solver"] = _solver(table)
@@ -348,11 +358,24 @@ def _growth(table: Table) -> Mapping[str, Any]:
     })  # fmt: skip
 
 
+def _until(table: Table, mesh: Mesh) -> tuple[str, ...] | None:
+    """Facet sets on which the cracks are when growth ends."""
+    if "until" not in table:
+        return None
+    try:
+        names = names_of_sets(table.content["until"], "until")
+        for name in names:
+            facet_set(mesh, name, "until")
+    except XcrackError as error:
+        table.wrap(error)
+    return names
+
+
 def _solver(table: Table) -> Any:
     name = table.text("solver")
-    if name not in _SOLVERS:
-        table.refuse("solver", f"{name!r:.40}: known is {', '.join(_SOLVERS)}; else a script.")
-    return _SOLVERS[name]
+    if name not in SOLVERS:
+        table.refuse("solver", f"{name!r:.40}: known is {', '.join(SOLVERS)}; else a script.")
+    return SOLVERS[name]
 
 
 def _solving(table: Table) -> Mapping[str, Any]:
@@ -390,4 +413,4 @@ def _flag(table: Table, name: str, default: bool) -> bool:
     return value
 
 
-__all__ = ["CaseFile", "read_case"]
+__all__ = ["METHODS", "SOLVERS", "CaseFile", "read_case"]

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.app.case_histories import retardation_of
 from xcrack.app.case_tables import Table
 from xcrack.app.case_values import argument_of, called_with, value_of_table
 from xcrack.base.arguments import Array, Declared, arguments_of
@@ -18,6 +19,7 @@ from xcrack.model.problem import Problem
 from xcrack.runs.assessment import assessment_line, residual_strength
 from xcrack.runs.inspection import inspection, logistic_pod
 from xcrack.runs.life import life
+from xcrack.runs.retarded import retarded
 from xcrack.runs.scatter import Scatter, lognormal, normal
 
 _DISTRIBUTIONS = {"lognormal": lognormal, "normal": normal}
@@ -140,6 +142,26 @@ def life_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mappin
     return MappingProxyType(given)
 
 
+def retarded_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Arguments of `retarded` beside the history; law and spectrum are those of the growth.
+
+    Raises
+    ------
+    ProblemError
+        A wrong key, unit or value, or growth without a spectrum; with file and line.
+    """
+    if not isinstance(growth["cycle"], Spectrum):
+        table.refuse("", "overloads are of a spectrum: give [growth.spectrum] in place of a cycle.")
+    own = [name for name in arguments_of(retarded) if name not in (*_OF_RUN, "model")]
+    given = {name: argument_of(table, name, retarded) for name in own if name in table}
+    content = {name: value for name, value in table.content.items() if name not in own}
+    given["model"] = retardation_of(Table(table.source, table.key, content))
+    if isinstance(given["model"], dict):
+        table.refuse("", "it is of one model: give kind, its numbers and zone.")
+    given |= {"nu": _poisson(table, problem), "law": growth["law"], "spectrum": growth["cycle"]}
+    return MappingProxyType(given)
+
+
 def inspection_of(table: Table) -> Mapping[str, Any]:
     """Arguments of `inspection` beside the history.
 
@@ -185,4 +207,4 @@ def strength_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
     return MappingProxyType(given)
 
 
-__all__ = ["inspection_of", "life_of", "strength_of"]
+__all__ = ["inspection_of", "life_of", "retarded_of", "strength_of"]

@@ -1,5 +1,7 @@
 """Run growth in a folder, or a case file, with table, pictures, files and report in its folder."""
 
+import csv
+from itertools import chain, count
 from os import PathLike
 from pathlib import Path
 from typing import Any, Unpack
@@ -10,7 +12,7 @@ from xcrack.analysis.solve import solve
 from xcrack.app.case import CaseFile, read_case
 from xcrack.base.arguments import FileName, Switch, check_arguments
 from xcrack.base.errors import ProblemError, warn
-from xcrack.base.paths import system_errors
+from xcrack.base.paths import system_errors, written_whole
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
@@ -24,6 +26,7 @@ from xcrack.runs.collect import Until, collect, resume
 from xcrack.runs.history import History
 from xcrack.runs.inspection import inspection
 from xcrack.runs.life import life
+from xcrack.runs.retarded import Retarded, retarded
 from xcrack.runs.run_folder import STEPS
 from xcrack.view.plot import plot
 from xcrack.view.report import report
@@ -134,6 +137,7 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
         result = growth_of_case(case, steps, resumed=resumed, overwrite=overwrite,
                                 keep_solutions=case.keep_solutions)  # fmt: skip
         result.write(case.folder)
+        _write_retarded(case, result)
         solutions = list(result.solved[-1].solutions) if result.solved else []
     _draw(case, solutions)
     report(result, case.folder / "report.html", title=case.title, units=case.units,
@@ -166,6 +170,35 @@ def _assessment_of(case: CaseFile, result: Any) -> dict[str, Any]:
     return made
 
 
+def retarded_lives(case: CaseFile, history: History) -> dict[str, Retarded]:
+    """Growth along the path of a run with each model of retardation, by what tells them apart."""
+    results: dict[str, Retarded] = {}
+    for given in case.retarded:
+        kind = type(given["model"]).__name__
+        names = chain([kind], (f"{kind}_{k}" for k in count(2)))
+        name = next(each for each in names if each not in results)
+        results[name] = retarded(history, **given)
+    return results
+
+
+def _write_retarded(case: CaseFile, history: History) -> None:
+    """A table of lengths and blocks for each model, and why growth ends."""
+    lives = retarded_lives(case, history)
+    if not lives:
+        return
+    target = case.folder / "retarded.csv"
+    with (
+        written_whole(target, "the table cannot be written to", error=ProblemError) as part,
+        part.open("w", encoding="utf-8", newline="") as stream,
+    ):
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(("model", "a", "blocks", "ended"))
+        for name, one in lives.items():
+            rows = [[name, a, N, ""] for a, N in zip(one.a.tolist(), one.blocks.tolist())]
+            rows[-1][-1] = one.ended or "the last step"
+            writer.writerows(rows)
+
+
 def growth_of_case(
     case: CaseFile,
     folder: Path,
@@ -177,12 +210,13 @@ def growth_of_case(
 ) -> History:
     """The growth of a case, stored in a folder; gone on with where it has begun there."""
     given = {**(case.growth or {}), **options}
+    storing: dict[str, Any] = {"until": case.until, "keep_solutions": keep_solutions}
     if resumed and _has_begun(folder):
         law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))
         return resume(folder, case.problem, law, criterion, cycle, given.pop("da", None),
-                      keep_solutions=keep_solutions, **given)  # fmt: skip
+                      **storing, **given)  # fmt: skip
     steps = grow(case.problem, **given)
-    return collect(steps, folder, overwrite=overwrite, keep_solutions=keep_solutions)
+    return collect(steps, folder, overwrite=overwrite, **storing)
 
 
 def _has_begun(folder: Path) -> bool:
@@ -197,4 +231,4 @@ def _draw(case: CaseFile, solutions: list[Solution]) -> None:
             plot(solution, field, file=case.folder / f"{name}.png", warp=case.warp)
 
 
-__all__ = ["growth_of_case", "run", "solved_case"]
+__all__ = ["growth_of_case", "retarded_lives", "run", "solved_case"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.app.case import read_case
-from xcrack.app.case_run import growth_of_case, solved_case
+from xcrack.app.case_run import growth_of_case, retarded_lives, solved_case
 from xcrack.app.case_tables import read_tables
 from xcrack.base.arguments import Switch, Whole, check_arguments
 from xcrack.base.checks import value_text
@@ -125,6 +125,7 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
         "steps": len(history.steps),
         "ended": history.ended,
         "folder": steps.parent.name,
+        **{f"life_{name}": one.life for name, one in retarded_lives(case, history).items()},
     }
 
 

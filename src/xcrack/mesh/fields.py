@@ -1,6 +1,7 @@
 """Fields from files: values on another mesh, interpolated wherever they are asked for."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from xcrack.base.arguments import FileName, Text, check_arguments
 from xcrack.base.arrays import Floats, Ints, at, frozen_copy
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import MeshError, ProblemError, warn
+from xcrack.base.optional import require_package
 from xcrack.base.paths import system_errors
 from xcrack.mesh.files import existing_file, meshio_read
 from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
@@ -190,6 +192,29 @@ def read_field(
         values = _at_points(points, content.cells, values, top, path.name)
     values = _values_of_shape(values, len(points), top, path.name)
     return _field(points, blocks, values, top, f"{name or 'of'} {path.name}".strip())
+
+
+def write_field(path: Path, field: Field, name: str) -> None:
+    """Write a field to a vtu file, from which `read_field` reads the same one.
+
+    Points that no cell uses are put to the origin.
+
+    Parameters
+    ----------
+    path : Path
+    field : Field
+    name : str
+        Of the data.
+    """
+    meshio = require_package("meshio", "writing a field")
+    d = field.mesh.dim
+    points = np.zeros((len(field.values), 3))
+    corners = field.mesh.points[field.mesh.cells]
+    points[field.nodes[:, : d + 1].ravel(), :d] = corners.reshape(-1, d)
+    kind = {3: "triangle", 6: "triangle6", 4: "tetra", 10: "tetra10"}[field.nodes.shape[1]]
+    values = field.values.reshape(len(points), -1)
+    with system_errors("the field cannot be written to", path):
+        meshio.Mesh(points, [(kind, field.nodes)], point_data={name: values}).write(path)
 
 
 def _data(content: Any, name: str | None, source: str) -> tuple[str, Any]:

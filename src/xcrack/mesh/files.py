@@ -211,7 +211,8 @@ def write_mesh(
       written once for each, as gmsh does.
     * ``.inp``: all sets as ``*ELSET``, facets as T3D2 or S3 elements. Names have no comma.
     * ``.vtu``, ``.vtk``, ``.xdmf``: facets as lower-dimensional cells, sets as 0/1 cell data
-      ``set:<name>``. A set without members survives in vtu-like formats only.
+      ``set:<name>``. A set without members survives in vtu-like formats only, and there alone
+      facets keep their order, so that results are the same to the last bit.
     * Others: points and cells only; sets are lost, with a warning.
 
     Parameters
@@ -318,15 +319,19 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
     facet_sets, cell_sets = sets_to_write(mesh)
     blocks, data = [(CELL_KIND[mesh.dim], mesh.cells)], {}
     if path.suffix.lower() in _WITH_CELL_DATA:
-        numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
-        rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
-        if len(rows):
-            blocks.insert(0, (FACET_KIND[mesh.dim], mesh.facets[rows]))
+        if not np.array_equal(mesh.facet_sets["boundary"], mesh.boundary):
+            facet_sets["boundary"] = mesh.facet_sets["boundary"]  # in an order of its own
+        sizes = [len(facets) for facets in facet_sets.values()]
+        owner = np.repeat(np.arange(len(sizes)), sizes)  # a facet of two sets comes twice: each set
+        if len(owner):  # keeps its order, and with it the last bit of what is summed over it
+            facets = np.concatenate(list(facet_sets.values()))
+            blocks.insert(0, (FACET_KIND[mesh.dim], facets))
+        place = {name: k for k, name in enumerate(facet_sets)}
         for name in dict.fromkeys([*facet_sets, *cell_sets]):
-            on_facets = np.isin(rows, numbers.get(name, [])).astype(np.int32)
+            on_facets = (owner == place.get(name, -1)).astype(np.int32)
             on_cells = np.zeros(len(mesh.cells), dtype=np.int32)
             on_cells[cell_sets.get(name, [])] = 1
-            data[_SET + quote(name)] = [on_facets, on_cells] if len(rows) else [on_cells]
+            data[_SET + quote(name)] = [on_facets, on_cells] if len(owner) else [on_cells]
     elif facet_sets or cell_sets:
         warn(
             f"{path.name}: {path.suffix} files carry no sets, so "

@@ -142,11 +142,12 @@ def with_curved_edges(mesh: Mesh, raw: RawMesh, number: Ints) -> Mesh:
 
 def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) -> dict[str, Ints]:
     """Facet sets with another name for a set "boundary" that is not the boundary of the mesh."""
-    facets = facet_sets.pop("boundary", None)
-    if facets is None:
+    if "boundary" not in facet_sets:
         return facet_sets
+    facets = facet_sets["boundary"]
     number, outer = (np.unique(bare.facet_numbers(f)) for f in (facets, bare.boundary))
     if not np.array_equal(number, outer):
+        del facet_sets["boundary"]
         name = "boundary_of_file"
         while name in facet_sets:
             name += "_"

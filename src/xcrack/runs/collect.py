@@ -10,6 +10,7 @@ from xcrack.base.checks import call_function, flag, value_text
 from xcrack.base.description import differences, only_compiled_differently
 from xcrack.base.errors import ProblemError, warn
 from xcrack.base.paths import path_of, system_errors
+from xcrack.crack.measures import measures
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
@@ -17,7 +18,7 @@ from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
 from xcrack.growth.run import growth_steps, steps_to_go_on_from
 from xcrack.growth.step import Step
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.model.problem import Problem
 from xcrack.runs import run_folder
 from xcrack.runs.history import History
@@ -26,7 +27,7 @@ from xcrack.runs.run_folder import RunHeader, RunStore
 from xcrack.runs.saved import read_saved
 from xcrack.runs.versions import versions
 
-Until = Callable[[Step], bool]
+Until = Callable[[Step], bool] | str | Sequence[str]  # a function, or names of facet sets
 
 _SHOWN = 5  # differences that a message lists
 
@@ -52,9 +53,10 @@ def collect(
     path : path, optional
         Folder in which each step is stored as soon as it is finished; `resume` goes on from it. One
         process at a time may write to it.
-    until : callable Step -> bool, optional
+    until : callable Step -> bool, str or sequence of str, optional
         Growth stops at the first step for which it is true; a step without tips is the last one
-        anyway, and is not asked.
+        anyway, and is not asked. Names of facet sets: at the first step whose cracks are on all of
+        them, such as a part-through crack on ``["front", "back"]``.
     overwrite : bool
         Begin although a run is stored in the folder: that one is moved aside, into a folder
         ``moved_aside_1`` in it.
@@ -304,8 +306,23 @@ class Collector:
         # Where no tip is left the run ends anyway, and functions of users look for K.
         if self.until is None or step.has_left:
             return False
+        if not callable(self.until):
+            return self._is_on_sets(step)
         enough = call_function(self.until, f"until, after step {step.index}", step)
         return flag(enough, "collect: what until returned")
+
+    def _is_on_sets(self, step: Step) -> bool:
+        """Whether the cracks of a step are on all facet sets that `until` names."""
+        if self.mesh is None:
+            raise ProblemError(
+                f"until = {value_text(self.until)}: the steps have no solutions, and so no mesh "
+                "with facet sets: give a function of a Step."
+            )
+        names = names_of_sets(self.until, "collect: until")
+        for name in names:
+            facet_set(self.mesh, name, "collect: until")
+        on = {row.name for crack in step.cracks for row in measures(crack, self.mesh).traces}
+        return on >= set(names)
 
     def _interrupt(self) -> str:
         if not self.taken:
@@ -313,7 +330,10 @@ class Collector:
         return f"interrupted after step {self.taken[-1].index}"
 
     def _stop(self) -> str:
-        return f"until was true at step {self.taken[-1].index}"
+        if callable(self.until):
+            return f"until was true at step {self.taken[-1].index}"
+        names = ", ".join(names_of_sets(self.until, "collect: until"))
+        return f"cracks are on {names} at step {self.taken[-1].index}"
 
     def _attach(self, error: Exception) -> None:
         """Hand the finished steps over with an error."""
@@ -387,11 +407,25 @@ def _move_aside(folder: Path, stored: run_folder.StoredSteps, damaged: Path | No
         warn(f"{damaged} was damaged: it was moved to {aside}, and made again from the steps.")
 
 
+def names_of_sets(value: Any, what: str) -> tuple[str, ...]:
+    """A name, or several, as a tuple of texts.
+
+    Raises
+    ------
+    ProblemError
+        Something else.
+    """
+    names = (value,) if isinstance(value, str) else value
+    if isinstance(names, Sequence) and names and all(isinstance(n, str) and n for n in names):
+        return tuple(names)
+    raise ProblemError(
+        f"{what} = {value_text(value)}: give a function of a Step, or names of facet sets."
+    )
+
+
 def _check_options(caller: str, until: Any, **flags: Any) -> None:
     if until is not None and not callable(until):
-        raise ProblemError(
-            f"{caller}: until = {value_text(until)} cannot be called: give a function of a Step."
-        )
+        names_of_sets(until, f"{caller}: until")
     for name, value in flags.items():
         flag(value, f"{caller}: {name}")
 
@@ -402,4 +436,4 @@ def _first_differences(lines: list[str]) -> str:
     return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
 
 
-__all__ = ["collect", "load", "resume"]
+__all__ = ["Until", "collect", "load", "names_of_sets", "resume"]

@@ -1,0 +1,266 @@
+"""Scenes of Python as case files: the same problem to the last bit, or the reason why not.
+
+The page of the verification book lists every case and example with what it is: data or not.
+"""
+
+import re
+import runpy
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import xcrack as xc
+from support.case_texts import STRIP, STRIP_GROWTH, STRIP_PULL
+from xcrack.app.case_run import growth_of_case
+from xcrack.base.description import describe
+from xcrack.verification.book import scenes_materials
+from xcrack.verification.book.run import find_cases
+
+TOP = Path(__file__).resolve().parents[2]
+EXAMPLES = {path.stem: path for path in (TOP / "examples").glob("*.py")}
+BOOK = {case.id: case for case in find_cases()}
+HEADING = {"book": "Cases of the book", "examples": "Examples"}
+FUNCTION, UNSOLVED, BODILESS = "a function of the place", "nothing is solved", "no body"
+
+
+def listed(what: str) -> dict[str, str]:
+    """Kind of each scene on the page, by its name: rows of a table."""
+    page = (TOP / "docs" / "verification.md").read_text(encoding="utf-8")
+    part = page.split(f"### {HEADING[what]}")[1].split("\n#")[0]
+    rows = [row.strip("|").split("|") for row in part.splitlines() if row.startswith("|")][2:]
+    return {
+        name: kind.strip() for kind, names in rows for name in re.findall(r"`([\w.-]+)`", names)
+    }
+
+
+class Asked(BaseException):
+    """What a scene asks first: to solve, to grow or to adapt."""
+
+
+def asks(name, *arguments, **named):
+    raise Asked(name, arguments, named)
+
+
+def kind_of(call, folder: Path) -> str:
+    """Whether the scene that a call asks for is data: its case file says the same."""
+    try:
+        call()
+    except Asked as asked:
+        name, given, named = asked.args
+        named.pop("progress", None)
+        named.pop("workers", None)
+        if name == "adapt":
+            problem, tolerance = given
+            given, named = (problem,), {"tolerance": tolerance, **named}
+        elif name != "grow":
+            given, named = given[:1], {"states": given[1] if len(given) > 1 else None}
+        try:
+            xc.write_case(folder / "case.toml", *given, **named)  # it reads and compares it
+        except xc.ProblemError as error:
+            return FUNCTION if "is a function" in str(error) else str(error)
+        problem = given[0] if given else named["problem"]
+        assert describe("", xc.read_case(folder / "case.toml").problem) == describe("", problem)
+        return "data"
+    return UNSOLVED
+
+
+def test_the_page_names_every_case_and_example():
+    assert set(listed("book")) == set(BOOK)
+    assert set(listed("examples")) == set(EXAMPLES)
+    assert set(listed("book").values()) == {"data", FUNCTION, UNSOLVED, BODILESS}
+
+
+@pytest.mark.slow
+@pytest.mark.gmsh
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("name", BOOK)
+def test_a_case_of_the_book_is_what_the_page_says(name, tmp_path, monkeypatch):
+    case = BOOK[name]
+    if case.needs:
+        pytest.importorskip(case.needs)
+    for module in [m for n, m in sys.modules.items() if n.startswith("xcrack.verification.book")]:
+        for each in ("solve", "grow", "inf_sup"):
+            if hasattr(module, each):
+                monkeypatch.setattr(module, each, partial(asks, each))
+    kind = BODILESS if not case.dim else kind_of(partial(case.run, 0), tmp_path)
+    assert kind == listed("book")[name]
+
+
+@pytest.mark.slow
+@pytest.mark.gmsh
+@pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_is_what_the_page_says(name, tmp_path, monkeypatch):
+    pytest.importorskip("gmsh")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(EXAMPLES[name]), "--quick"])
+    for each in ("solve", "grow", "adapt"):
+        monkeypatch.setattr(xc, each, partial(asks, each), raising=False)
+    monkeypatch.setattr(  # of a study the first case, in this process
+        xc, "campaign", lambda case, cases, **_: case(**next(iter(cases))), raising=False
+    )
+    call = partial(runpy.run_path, str(EXAMPLES[name]), run_name="__main__")
+    assert kind_of(call, tmp_path) == listed("examples")[name]
+
+
+PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+CRACK = xc.line_crack([(0.0, 0.05), (0.4, 0.05)])
+
+
+def plate(**given):
+    scene = {"material": xc.Isotropic(1e5, 0.3, "strain"), "cracks": [CRACK], "loads": PULL}
+    return xc.Problem(xc.box((0.0, -1.0), (1.0, 1.0), (10, 20)), **scene | given)
+
+
+@pytest.mark.parametrize(
+    "growth",
+    [
+        {"law": xc.paris(1e-9, 3.0), "cycle": xc.Cycle(0.1, 1.0), "da": 0.05},
+        {"law": xc.rate_table({0.0: ([1, 9], [1e-9, 1e-6]), 0.5: ([0.9, 8], [1e-9, 1e-6])}),
+         "cycle": xc.Cycle(states=[0.0, [PULL[0], PULL[1]]]), "da": 0.05, "max_size": 0.8},
+        {"law": xc.with_time(xc.walker(1e-9, 3.0, 0.5), xc.time_rate(1e-8, 2.0), 2.0),
+         "cycle": xc.Cycle(0.0, 1.0), "tolerance": 0.05, "solver": xc.pardiso},
+        {"law": xc.law("Al 7075-T6") if "Al 7075-T6" in xc.presets() else xc.paris(1e-9, 3),
+         "cycle": xc.Spectrum([0.0, 1.0, 0.2, 0.8], unit="flight", steady=[PULL[0]], levels=3),
+         "da": 0.05, "criterion": partial(xc.mean_reference, reference="max")},
+        {"law": xc.paris(1e-9, 3.0), "cycle": xc.Spectrum(rows=[(0, 1, 2), (0.5, 1, 9)]),
+         "da": 0.05, "load_program": xc.load_over_size([(0.3, 1.0), (0.6, 0.8)]),
+         "link_up": xc.plastic_zone(400.0, 2)},
+        {"law": xc.paris(1e-9, 3.0), "cycle": xc.Spectrum([0.0, 1.0, *[0.0, 0.5] * 9]), "da": 0.05,
+         "retardation": xc.willenborg(2.5, 0.1, xc.plastic_zone(400.0, beta=2)), "K_c": 90.0},
+    ],
+    ids=["paris", "table", "time", "steady", "rows", "retardation"],
+)  # fmt: skip
+def test_growth_is_written_as_it_was_asked_for(growth, tmp_path):
+    given = {"criterion": xc.max_hoop_stress, **growth}
+    xc.write_case(tmp_path / "case.toml", plate(), **given)  # it compares both itself
+    case = xc.read_case(tmp_path / "case.toml")
+    assert set(case.growth) == set(given)
+    assert describe("", case.growth["law"]) == describe("", given["law"])
+    assert describe("", case.growth["cycle"]) == describe("", given["cycle"])
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        lambda: plate(supports=[xc.fix((1.0, -1.0)), xc.displacement("right", (None, 0.1))],
+                      friction=(0.3,), contact="on", order=1),
+        lambda: plate(loads=[xc.initial_stress([[1.0, 0.2], [0.2, 3.0]]), xc.crack_pressure(2.0, 0),
+                             xc.temperature(50.0, 1e-5), xc.body_force((0.0, -1e-3))]),
+        lambda: plate(numerics=xc.Numerics(radius=0.1, points=6),
+                      handbook=[xc.handbook("edge", a=0.4, W=1.0, S=1.0)]),
+        lambda: scenes_materials.edge_crack(10, 0.4, 0.1),
+    ],
+    ids=["supports", "loads", "numerics", "materials"],
+)  # fmt: skip
+def test_scenes_are_written_as_they_are(problem, tmp_path):
+    given = problem()
+    xc.write_case(tmp_path / "case.toml", given, title='A "plate"', states=[1.0, [PULL[0]]])
+    case = xc.read_case(tmp_path / "case.toml")
+    assert describe("", case.problem) == describe("", given)
+    assert [type(each) for each in case.problem.handbook] == [type(h) for h in given.handbook]
+    assert case.title == 'A "plate"'
+    assert case.states[0] == 1.0
+    assert describe("", case.states[1]) == describe("", [PULL[0]])
+
+
+def test_arms_and_fields_are_written(tmp_path, monkeypatch):
+    import meshio
+
+    monkeypatch.chdir(tmp_path)
+    body = xc.box((-1, -1, -1), (1, 1, 1), 4)
+    values = {"p": 1.0 + body.points[:, 0] ** 2}
+    meshio.Mesh(body.points, [("tetra", body.cells)], point_data=values).write("field.vtu")
+    one = xc.penny_crack((0, 0, 0.03), (0, 0, 1), 0.6, n=16)
+    other = xc.penny_crack((0.02, 0, 0.03), (1, 0, 0), 0.4, n=16)
+    problem = xc.Problem(
+        body, xc.Isotropic(1.0, 0.3), [one, xc.arm(other, 0, 1)],
+        loads=[xc.pressure("top", xc.read_field("field.vtu", "p"))],
+    )  # fmt: skip
+    xc.write_case("case.toml", problem)
+    assert describe("", xc.read_case("case.toml").problem) == describe("", problem)
+    (tmp_path / "other").mkdir()
+    xc.write_case("other/case.toml", problem)  # the field goes with it
+    assert describe("", xc.read_case("other/case.toml").problem) == describe("", problem)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (lambda: {"problem": plate(loads=[xc.traction("top", lambda x: 0 * x)])},
+         "loads[0], traction('top'): value is a function"),
+        (lambda: {"law": lambda dK, R: 1e-3 * dK}, "law is a function"),
+        (lambda: {"criterion": lambda K, nu: None}, "criterion is a function"),
+        (lambda: {"link_up": lambda K: 0 * K}, "link_up is a function"),
+        (lambda: {"until": lambda step: True}, "until"),
+        (lambda: {"states": [1.0]}, "leave states out"),
+        (lambda: {"cycle": None}, "give all three"),
+    ],
+)  # fmt: skip
+def test_what_is_no_data_is_refused_by_its_name(given, words, tmp_path):
+    growth = {"problem": plate(), "law": xc.paris(1e-9, 3.0), "criterion": xc.max_hoop_stress,
+              "cycle": xc.Cycle(0.0, 1.0), "da": 0.05}  # fmt: skip
+    with pytest.raises(xc.ProblemError, match=re.escape(words)):
+        xc.write_case(tmp_path / "case.toml", **growth | given())
+    assert not (tmp_path / "case.toml").exists()
+
+
+def strip_case(folder: Path, more: str) -> Path:
+    file = folder / "case.toml"
+    file.write_text(STRIP + STRIP_PULL + STRIP_GROWTH + more, encoding="utf-8")
+    return file
+
+
+def test_growth_ends_where_cracks_are_on_named_sets(tmp_path):
+    """The edge crack is on the left side from the first step on, and never on the right one."""
+    file = strip_case(tmp_path, 'until = "left"\n')
+    case = xc.read_case(file)
+    history = growth_of_case(case, tmp_path / "run", resumed=False, progress=False)
+    assert len(history.steps) == 1
+    assert history.ended == "cracks are on left at step 0"
+    steps = xc.grow(case.problem, **case.growth)
+    assert len(xc.collect(steps, until=["left", "right"]).steps) == 2
+    with pytest.raises(xc.ProblemError, match=r"line \d+, growth.until: .*'lfet'"):
+        xc.read_case(strip_case(tmp_path, 'until = "lfet"\n'))
+    with pytest.raises(xc.ProblemError, match=r"line \d+, growth.until: until = 3: give"):
+        xc.read_case(strip_case(tmp_path, "until = 3\n"))
+
+
+RETARDED = """
+[growth.spectrum]
+factors = [0.0, 1.0, 0.0, 0.5, 0.0, 0.5, 0.0, 0.5]
+[[retarded]]
+kind = "wheeler"
+w = 1.3
+zone = { sigma_y = "400 MPa", beta = 2 }
+[[retarded]]
+kind = "willenborg"
+shutoff = 2.7
+dK_th = 10.0
+zone = { sigma_y = "400 MPa", beta = 2 }
+max_blocks = 1e5
+"""
+
+
+@pytest.mark.slow
+def test_lives_with_retardation_along_the_path(tmp_path):
+    file = strip_case(tmp_path, "")
+    text = file.read_text(encoding="utf-8").replace("cycle = { min = 0.1, max = 1.0 }\n", "")
+    file.write_text(text + RETARDED, encoding="utf-8")
+    history = xc.run(file)
+    case = xc.read_case(file)
+    rows = (tmp_path / "case_results" / "retarded.csv").read_text().splitlines()
+    for given in case.retarded:
+        wanted = xc.retarded(history, case.growth["law"], case.growth["cycle"], given["model"],
+                             nu=0.3)  # fmt: skip
+        own = [row.split(",") for row in rows if row.startswith(type(given["model"]).__name__)]
+        assert np.array_equal([float(row[2]) for row in own], wanted.blocks)
+        assert own[-1][3] == "the last step"
+        assert wanted.life > 1.05 * history.life
+    more = RETARDED.partition("[[retarded]]")[2].partition("[[retarded]]")[0]
+    file = strip_case(tmp_path, "[[retarded]]" + more)
+    with pytest.raises(xc.ProblemError, match=r"line \d+, retarded 1: overloads are of a spectr"):
+        xc.read_case(file)
