@@ -1,6 +1,6 @@
 """Contact of crack faces (lips): which cracks need multipliers, and the pressures in all states."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -133,6 +133,7 @@ def solve_contact(
     pressure: list[Floats | None] = [None] * n
     active: list[Bools | None] = [None] * n
     expected: list[int] = []
+    trials: dict[int, Multipliers] = {}
     sets, dual = 0, None
     rubbed: FrictionSolution | None = None
     chosen: list[Multipliers] = []
@@ -147,14 +148,14 @@ def solve_contact(
         if u is None:
             pending = expected = closed
         else:
-            pending = _overlapping_cracks(problem, model, u, spaces)
+            pending = _overlapping_cracks(problem, model, u, spaces, trials)
             if not pending and not exact:
                 u = engine.solve(f, u_imposed, u)
-                pending = _overlapping_cracks(problem, model, u, spaces)
+                pending = _overlapping_cracks(problem, model, u, spaces, trials)
     opened = u
     while pending:
         for c in pending:
-            spaces[c] = _space(problem, model, c)
+            spaces[c] = _space(problem, model, c, trials)
         chosen = [m for m in spaces if m is not None]
         if any(has_friction(problem, m.crack) for m in chosen):
             rubbed = _solve_friction(problem, model, engine, chosen, f, u_imposed, reuse, repeated)
@@ -172,7 +173,7 @@ def solve_contact(
             active[m.crack] = np.stack([s.active[first:last] for s in states])
             first = last
         displacements = u if rubbed is None else np.concatenate([u, rubbed.between], axis=1)
-        pending = _overlapping_cracks(problem, model, displacements, spaces)
+        pending = _overlapping_cracks(problem, model, displacements, spaces, trials)
     assert u is not None  # of the first look, or of the loop that it made begin
     if rubbed is not None:
         parts = tuple(spaces), tuple(pressure), tuple(active)
@@ -248,9 +249,16 @@ def _solve_states(
 
 
 def _overlapping_cracks(
-    problem: Problem, model: System, u: Floats, spaces: Sequence[Multipliers | None]
+    problem: Problem,
+    model: System,
+    u: Floats,
+    spaces: Sequence[Multipliers | None],
+    trials: dict[int, Multipliers],
 ) -> list[int]:
-    """Cracks without multipliers whose faces overlap in some load state."""
+    """Cracks without multipliers whose faces overlap in some load state.
+
+    The multipliers that say so are kept in `trials`, by crack.
+    """
     needing = []
     for c, lips in enumerate(model.lips):
         if spaces[c] is not None or not len(lips):
@@ -262,23 +270,29 @@ def _overlapping_cracks(
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
         if (gap.min(axis=0) >= limit).all():
             continue
-        trial = multipliers(
-            model.space, c, lips, problem.numerics.multipliers, model.known.is_fixed,
-            material=material_numbers(problem),
-        )  # fmt: skip
+        if c not in trials:
+            trials[c] = multipliers(
+                model.space, c, lips, problem.numerics.multipliers, model.known.is_fixed,
+                material=material_numbers(problem),
+            )  # fmt: skip
+        trial = trials[c]
         weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
         if (weak.min(axis=0) < limit).any():
             needing.append(c)
     return needing
 
 
-def _space(problem: Problem, model: System, c: int) -> Multipliers:
-    """Where the pressures of a crack live."""
+def _space(
+    problem: Problem, model: System, c: int, trials: Mapping[int, Multipliers]
+) -> Multipliers:
+    """Where the pressures of a crack live: as tried already, where nothing asks for others."""
     method = problem.numerics.contact_method
     if method is not None:
         return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
     fixed, rub = model.known.is_fixed, has_friction(problem, c)
+    if c in trials and not rub:
+        return trials[c]
     return multipliers(model.space, c, model.lips[c], kind, fixed, rub, material_numbers(problem))
 
 

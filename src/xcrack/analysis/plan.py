@@ -111,6 +111,8 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
     ------
     SizeError
     """
+    if _fits_surely(problem):
+        return
     ahead = forecast_of(problem, n_states)
     if ahead.fits:
         return
@@ -121,6 +123,17 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
         less = forecast_of(replace(problem, order=1), n_states)
         remedy_list.insert(0, f"order=1 ({_size(less.memory)}, with K less exact)")
     raise SizeError(f"solve: {ahead}. Give {', '.join(remedy_list)}.")
+
+
+def _fits_surely(problem: Problem) -> bool:
+    """Whether a factorisation in 2D fits if all nodes carry all functions: no look at cracks."""
+    mesh, free = problem.mesh, free_memory()
+    if free is None or mesh.dim == 3 or problem.numerics.linear == "iterative":
+        return free is None
+    functions = [1 + problem.numerics.functions * crack.n_tips for crack in problem.placed]
+    each, power = _OF_FACTOR[2]
+    n = 2 * _count_nodes(mesh, problem.order or 1) * (1 + sum(functions))
+    return bool(each * float(n) ** power <= free)
 
 
 def takes_iterations(problem: Problem, n: int) -> bool:

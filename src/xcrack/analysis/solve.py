@@ -20,7 +20,15 @@ from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, warn
 from xcrack.base.machine import one_blas_thread, threads
 from xcrack.fem.assembly import MeshLoad, body_forces, next_to_enriched
-from xcrack.fem.loads import body_points, known_unknowns, load_vector, mesh_loads, on_mesh, position
+from xcrack.fem.loads import (
+    body_points,
+    known_unknowns,
+    load_vector,
+    load_vectors,
+    mesh_loads,
+    on_mesh,
+    position,
+)
 from xcrack.fem.system import System, build
 from xcrack.linalg.direct import Solver, system
 from xcrack.linalg.engine import Engine, SolverState
@@ -296,9 +304,10 @@ def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats
     """A load state; states that share loads integrate them once."""
     acting = problem.state(state)
     parts = []
+    new_loads = list({id(load): load for load, _ in acting if id(load) not in vectors}.values())
+    each = load_vectors(model.space, problem.elasticity, new_loads, model.lips)
+    vectors.update(zip(map(id, new_loads), each, strict=True))
     for load, factor in acting:
-        if id(load) not in vectors:
-            vectors[id(load)] = load_vector(model.space, problem.elasticity, load, model.lips)
         vector = vectors[id(load)]
         parts.append(vector if factor == 1 else factor * vector)
     f = sum(parts, np.zeros(model.space.n_dof))

@@ -29,27 +29,60 @@ def load_vector(
     ProblemError
         A set with facets inside the body, or what the load says.
     """
-    f = np.zeros((space.n_functions, space.dim))
-    acts = load.acts
-    if "traction" in acts:
-        points, on_facets = outer_points(space, load)
-        _add(f, space, points, load.traction(on_facets))
-    if "point_force" in acts:
-        _add_point_forces(f, space, *load.point_forces(space.mesh))
-    if "volume" in acts:
-        points = body_points(space)
-        _add(f, space, points, load.volume(position(space, points.cell, points.bary)))
-    if "initial_stress" in acts:
-        points = body_points(space)
-        x = position(space, points.cell, points.bary)
-        sigma = elasticity.initial_stress(load, x, points.cell, points.bary)
-        _subtract_stress(f, space, points, sigma)
-    if "face_pressure" in acts:
-        for c, on_lip in enumerate(lips):
-            p = load.face_pressure(on_lip.x, c)
-            if p is not None:
-                f += lip_force(space, c, on_lip, p[:, None] * on_lip.normal)
-    return f.ravel()
+    return load_vectors(space, elasticity, [load], lips)[0]
+
+
+def load_vectors(
+    space: FunctionSpace,
+    elasticity: Elasticity,
+    loads: Sequence[Load],
+    lips: tuple[LipPoints, ...],
+) -> list[Floats]:
+    """Some loads, as `load_vector` has each; the functions on their facets are tabulated once."""
+    forces = [np.zeros((space.n_functions, space.dim)) for _ in loads]
+    _add_tractions(forces, space, loads)
+    for f, load in zip(forces, loads, strict=True):
+        acts = load.acts
+        if "point_force" in acts:
+            _add_point_forces(f, space, *load.point_forces(space.mesh))
+        if "volume" in acts:
+            points = body_points(space)
+            _add(f, space, points, load.volume(position(space, points.cell, points.bary)))
+        if "initial_stress" in acts:
+            points = body_points(space)
+            x = position(space, points.cell, points.bary)
+            sigma = elasticity.initial_stress(load, x, points.cell, points.bary)
+            _subtract_stress(f, space, points, sigma)
+        if "face_pressure" in acts:
+            for c, on_lip in enumerate(lips):
+                p = load.face_pressure(on_lip.x, c)
+                if p is not None:
+                    f += lip_force(space, c, on_lip, p[:, None] * on_lip.normal)
+    return [f.ravel() for f in forces]
+
+
+def _add_tractions(forces: list[Floats], space: FunctionSpace, loads: Sequence[Load]) -> None:
+    """Add the tractions among some loads, each to its own force `(n_functions, d)`."""
+    pull = [k for k, load in enumerate(loads) if "traction" in load.acts]
+    if not pull:
+        return
+    sets: dict[str, Ints] = {}
+    for k in pull:
+        if loads[k].where not in sets:
+            sets[loads[k].where] = _outer_facets(space, loads[k])
+    facets = np.concatenate(list(sets.values()))
+    number_of_set = np.repeat(np.arange(len(sets)), [len(each) for each in sets.values()])
+    points, normal, owner = _points_on_facets(space, facets)
+    x = position(space, points.cell, points.bary)
+    rows = {name: (number_of_set[owner] == k).nonzero()[0] for k, name in enumerate(sets)}
+    density = np.zeros((len(pull), len(x), space.dim))
+    for values, k in zip(density, pull, strict=True):
+        chosen = rows[loads[k].where]
+        places = FacetPoints(
+            space.mesh, sets[loads[k].where], x[chosen], normal[chosen], points.weight[chosen]
+        )
+        values[chosen] = loads[k].traction(places)
+    _add_densities([forces[k] for k in pull], space, points, density)
 
 
 def outer_points(space: FunctionSpace, load: Load, halvings: int = 0) -> tuple[Points, FacetPoints]:
@@ -60,6 +93,14 @@ def outer_points(space: FunctionSpace, load: Load, halvings: int = 0) -> tuple[P
     ProblemError
         A set with facets inside the body.
     """
+    facets = _outer_facets(space, load)
+    points, normal = facet_points(space, facets, halvings=halvings)
+    x = position(space, points.cell, points.bary)
+    return points, FacetPoints(space.mesh, facets, x, normal, points.weight)
+
+
+def _outer_facets(space: FunctionSpace, load: Load) -> Ints:
+    """The facet set of a load, all of whose facets lie on the boundary."""
     facets = facet_set(space.mesh, load.where, load.name)
     inner = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
     if inner.any():
@@ -67,9 +108,7 @@ def outer_points(space: FunctionSpace, load: Load, halvings: int = 0) -> tuple[P
             f"{load.name}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
             "boundary only."
         )
-    points, normal = facet_points(space, facets, halvings=halvings)
-    x = position(space, points.cell, points.bary)
-    return points, FacetPoints(space.mesh, facets, x, normal, points.weight)
+    return facets
 
 
 def position(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
@@ -82,12 +121,19 @@ def position(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
 
 def _add(f: Floats, space: FunctionSpace, points: Points, density: Floats) -> None:
     """Add the integral of density . v over the points."""
-    cells = np.unique(points.cell)
-    for batch, _ in space.batches(cells):
-        number, row, _ = points.of_cells(batch.cells)
+    _add_densities([f], space, points, density[None])
+
+
+def _add_densities(
+    forces: Sequence[Floats], space: FunctionSpace, points: Points, density: Floats
+) -> None:
+    """Add the integrals of densities . v over the points, each to one of the forces."""
+    from xcrack.fem.kernels.functions import add_forces
+
+    for batch, number, row in space.batches_of_points(points.cell):
         N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
-        force = N[:, :, None] * (points.weight[number, None] * density[number])[:, None]
-        _scatter(f, batch.functions[row], force)
+        for f, values in zip(forces, density, strict=True):
+            add_forces(f, number, batch.functions, row, N, points.weight, values)
 
 
 def _add_point_forces(f: Floats, space: FunctionSpace, number: Ints, force: Floats) -> None:
@@ -136,6 +182,13 @@ def facet_points(
 
     `n` and `halvings` are those of `part_points`.
     """
+    return _points_on_facets(space, facets, n, halvings)[:2]
+
+
+def _points_on_facets(
+    space: FunctionSpace, facets: Ints, n: int = 6, halvings: int = 0
+) -> tuple[Points, Floats, Ints]:
+    """The same, and the row of the facet of each point."""
     mesh = space.mesh
     number = numbers_of(mesh, facets)
     cell = mesh.facet_to_cell[number, 0]
@@ -156,7 +209,8 @@ def facet_points(
         side[crossed, i] = parts.side[k, i][crossed]
     side = at_joints(space, c, bary, side)
     order = np.argsort(c, kind="stable")
-    return Points(c[order], bary[order], weight[order], side[order]), normal[order]
+    points = Points(c[order], bary[order], weight[order], side[order])
+    return points, normal[order], owner[order]
 
 
 def _subtract_stress(f: Floats, space: FunctionSpace, points: Points, sigma: Floats) -> None:

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -228,6 +229,11 @@ def _check_finite(result: Floats, x: Floats, what: str) -> None:
 
 
 def _n_positional(function: Callable[..., Any]) -> int:
+    if isinstance(function, FunctionType) and not hasattr(function, "__wrapped__"):
+        code = function.__code__  # what inspect finds out at a hundred times the cost
+        if code.co_flags & inspect.CO_VARARGS:
+            return 2
+        return code.co_argcount - len(function.__defaults__ or ())
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):

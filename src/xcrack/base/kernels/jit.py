@@ -9,6 +9,7 @@ numba keeps compiled code beside the source or in the user's cache folder. It ra
 may be written to (containers, clusters), and at every later run once a cache file is damaged.
 """
 
+import gc
 import logging
 import os
 import stat
@@ -22,7 +23,7 @@ from typing import Any
 import numba
 from numba.core import caching
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
@@ -75,10 +76,47 @@ class _HelperLowering(NativeLowering):
         return True
 
 
+class _Flags(Flags):
+    """numba's flags, that are compared by what is set.
+
+    Each look for an overload compares flags; numba takes all two dozen of them by their names for
+    that, which is a sixth of what compiling takes.
+    """
+
+    __slots__ = ()
+
+    def __hash__(self) -> int:
+        return _FLAGS_HASH
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            isinstance(other, Flags) and (self._values == other._values or super().__eq__(other))
+        )
+
+
+_FLAGS_HASH = hash(Flags())  # the same for all of them: of their names
+
+
 class _Kernel(CompilerBase):
     """numba's passes without those that kernels do not need."""
 
     library, lowering = _Library, NativeLowering
+
+    def __init__(  # the arguments of numba, in its order
+        self, typingctx: Any, targetctx: Any, library: Any, args: Any, return_type: Any,
+        flags: Any, locals: Any,
+    ) -> None:  # fmt: skip
+        super().__init__(typingctx, targetctx, library, args, return_type, _Flags(flags), locals)
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile without the collector of garbage, which finds little and looks at everything."""
+        if not gc.isenabled():
+            return super().compile_extra(func)
+        gc.disable()
+        try:
+            return super().compile_extra(func)
+        finally:
+            gc.enable()
 
     def define_pipelines(self) -> list[Any]:
         state, passes = self.state, PassManager("kernel")

@@ -341,6 +341,35 @@ def add_correction(slope, first, piece, row, coefficient, moment, functions):  #
 
 
 @kernel
+def add_forces(force, number, functions, row, value, weight, density):  # type: ignore[no-untyped-def]
+    """Add the integral of a density times each function over some points.
+
+    Parameters
+    ----------
+    force : (f, d) array
+        Changed in place.
+    number : (k,) array of int
+        Points over which it is taken.
+    functions : (m, n) array of int
+        Negative where there is none.
+    row : (k,) array of int
+        Place of each point in `functions`.
+    value : (k, n) array
+        The functions at the points.
+    weight : (q,) array
+    density : (q, d) array
+    """
+    d = density.shape[1]
+    for p in range(len(number)):
+        q = number[p]
+        for a in range(functions.shape[1]):
+            f = functions[row[p], a]
+            if f >= 0:
+                for j in range(d):
+                    force[f, j] += value[p, a] * (weight[q] * density[q, j])
+
+
+@kernel
 def set_gradients(gradient, number, slope, functions, row, coefficients):  # type: ignore[no-untyped-def]
     """Set the gradients of displacements at some points.
 
