@@ -1,6 +1,7 @@
 """Error bars of K in 2D: against exact fields and finer meshes, and where there are none."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,23 +177,59 @@ def test_stored_solution_is_solved_again():
     ("problem", "word"),
     [
         (edge(order=1), "order=2"),
-        (edge(n=8, tip=0.2), "cells long"),
-        (edge(n=8, tip=0.93), "cells away"),
-        (
-            edge(
-                contact="on",
-                numerics=xc.Numerics(contact_method=methods.penalty()),
-            ),
-            "penalty",
-        ),
+        (edge(contact="on", numerics=xc.Numerics(contact_method=methods.penalty())), "penalty"),
     ],
 )
 def test_no_bar_and_why(problem, word):
+    """What a second solution does not show either."""
     sif = with_error(problem)
     assert np.isnan(sif.eta).all()
     assert np.isnan(sif.bar).all()
     assert np.isnan(sif.best).all()
     assert word in sif.reasons[0]
+
+
+def rubbing(n=10, **options):
+    """An inner crack that is pressed and sheared, with friction."""
+    S = np.array([[-0.3, 0.6], [0.6, -1.0]])
+    loads = [xc.traction(side, lambda x, normal: normal @ S) for side in scenes.SIDES]
+    line = xc.line_crack([(-0.41, -0.12), (0.37, 0.05)])
+    return xc.Problem(
+        scenes.perturbed(n, 5, 0.15), UNIT, [line], loads=loads, friction=0.3, **options
+    )
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        edge(n=8, tip=0.2),
+        edge(n=8, tip=0.93),
+        rubbing(),
+    ],
+    ids=["short", "before a side", "friction"],
+)
+def test_bar_from_smaller_cells(problem):
+    """Where one solution has no estimate a second one has; against a mesh that is fine there."""
+    sif = with_error(problem)
+    assert sif.reasons == ("",) * len(sif.K)
+    tips = problem.placed[0].points[list(problem.placed[0].tips)]
+
+    def size(x):
+        away = np.linalg.norm(x[:, None] - tips, axis=2).min(axis=1)
+        return np.minimum(0.005 + 0.15 * away, 0.06)
+
+    fine = replace(problem, mesh=xc.refine(problem.mesh, size=size))
+    wanted = xc.stress_intensity(xc.solve(fine)).K
+    assert holds(sif, wanted)
+    assert np.abs(sif.best - wanted).max() < np.abs(sif.K - wanted).max()
+    assert sif.bar.max() < 0.1 * np.abs(wanted).max()
+
+
+def test_no_bar_for_a_state_of_a_path_that_is_not_given():
+    """With friction a state is reached by way of others: without them there is no second one."""
+    states = xc.solve(rubbing(), states=[0.5, 1.0], error=True)
+    assert np.isnan(xc.stress_intensity(states[1]).bar).all()
+    assert np.isfinite(xc.stress_intensities(states)[1].bar).all()
 
 
 def test_not_asked_for():

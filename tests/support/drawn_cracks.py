@@ -30,11 +30,15 @@ _LEAST = 1e-6  # of the largest K: what nobody can tell apart
 
 @dataclass(frozen=True)
 class Scene:
-    """A problem, its name, and the points that references need small cells at, beside tips."""
+    """A problem, its name, and the points that references need small cells at, beside tips.
+
+    In the plane also the stress (2, 2) that pulls at its sides.
+    """
 
     kind: str
     problem: xc.Problem
     special: np.ndarray
+    stress: np.ndarray | None = None
 
 
 def far_stress(rng, dim):
@@ -245,9 +249,66 @@ def plane(seed):
     if rng.random() < 0.12:
         options["friction"] = rng.uniform(0.1, 0.8)
         name += ", friction"
-    cracks, loads = [xc.line_crack(x) for x in lines], loads_of(far_stress(rng, 2), SIDES)
-    problem = xc.Problem(mesh, material, cracks, loads=loads, **options)
-    return Scene(name, problem, np.concatenate(special))
+    cracks, stress = [xc.line_crack(x) for x in lines], far_stress(rng, 2)
+    problem = xc.Problem(mesh, material, cracks, loads=loads_of(stress, SIDES), **options)
+    return Scene(name, problem, np.concatenate(special), stress)
+
+
+def moved(scene, Q):
+    """The problem of a scene in the plane with body, cracks and loads times a rotation Q (2, 2)."""
+    given, stress = scene.problem.mesh, Q @ scene.stress @ Q.T
+    curves = {
+        name: lambda x, curve=curve: np.asarray(curve(x @ Q)) @ Q.T
+        for name, curve in given.curves.items()
+    }
+    sets = dict(given.facet_sets), dict(given.cell_sets)
+    mesh = xc.Mesh(given.points @ Q.T, given.cells, *sets, curves=curves)
+    cracks = [xc.line_crack(crack.points @ Q.T) for crack in scene.problem.cracks]
+    return replace(scene.problem, mesh=mesh, cracks=cracks, loads=loads_of(stress, SIDES))
+
+
+def variants(seed):
+    """A scene in the plane turned, mirrored, and with its cracks moved by 1e-9 of a cell.
+
+    Returns
+    -------
+    dict
+        Problem, and the sign that K_II has there, by name; "drawn" is the scene itself.
+    """
+    scene, rng = plane(seed), np.random.default_rng([9144, seed])
+    a, b = rng.uniform(-np.pi, np.pi, 2)
+    way = 1e-9 * float(scene.problem.mesh.cell_size.mean()) * scenes.rows(b)[0]
+    cracks = [xc.line_crack(crack.points + way) for crack in scene.problem.cracks]
+    return {
+        "drawn": (scene.problem, 1),
+        "turned": (moved(scene, scenes.rows(a)), 1),
+        "mirrored": (moved(scene, np.diag([-1.0, 1.0])), -1),
+        "shifted": (replace(scene.problem, cracks=cracks), 1),
+    }
+
+
+def changes(seed):
+    """Largest change of K, over the largest K, of each of `variants`; nothing where it is refused.
+
+    Infinite where only one of two is refused, or tips are others.
+    """
+    K = {}
+    for name, (problem, sign) in variants(seed).items():
+        try:
+            solution = xc.solve(problem)
+            tips = [xc.stress_intensity(solution, c).K for c in range(len(problem.cracks))]
+            K[name] = np.concatenate(tips) * [1, sign]
+        except xc.XcrackError:
+            K[name] = None
+    drawn = K.pop("drawn")
+    if drawn is None:
+        return {name: np.inf for name, other in K.items() if other is not None}
+    size = max(float(np.abs(drawn).max(initial=0.0)), 1e-300)
+    return {
+        name: np.inf if other is None or other.shape != drawn.shape
+        else float(np.abs(other - drawn).max(initial=0.0)) / size
+        for name, other in K.items()
+    }  # fmt: skip
 
 
 # In space ---------------------------------------------------------------------------------------

@@ -347,7 +347,9 @@ def _groups(
     edges = np.nonzero(~np.isnan(cut.cut_edge))[0]
     pairs = mesh.edges[edges]
     vital = vital_edges(
-        pairs, np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
+        pairs,
+        np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1),
+        _places_along(space, c, edges),
     )
     place = {int(n): i for i, n in enumerate(nodes)}
     parent = np.arange(len(nodes))
@@ -405,21 +407,37 @@ def _nearest_nodes(traces: sp.csr_matrix, weight: Floats, covered: Bools) -> lis
     products = traces.data[uncovered] * weight[point[uncovered]] * traces.data[other]
     overlap = np.bincount(number, products, len(pair))
     node, to = np.divmod(pair, len(covered))
-    best = np.lexsort((to, -overlap, node))
+    # Of overlaps that are equal but for round-off the first node counts.
+    largest = np.zeros(len(covered))
+    np.maximum.at(largest, node, overlap)
+    share = np.rint(overlap / (_SAME * np.where(largest > 0, largest, 1.0))[node])
+    best = np.lexsort((to, -share, node))
     first = np.unique(node[best], return_index=True)[1]
     return list(zip(node[best][first].tolist(), to[best][first].tolist()))
 
 
-def vital_edges(pairs: Ints, length: Floats) -> Ints:
+def _places_along(space: FunctionSpace, c: int, edges: Ints) -> Floats:
+    """Where crack c cuts some edges, along it `(e,)`; zero in 3D, where there is no such order."""
+    mesh, t = space.mesh, space.cuts[c].cut_edge[edges, None]
+    if space.dim == 3 or not len(edges):
+        return np.zeros(len(edges))
+    first, second = mesh.points[mesh.edges[edges]].transpose(1, 0, 2)
+    return arc_position(space.cracks[c].points, (1 - t) * first + t * second)
+
+
+def vital_edges(pairs: Ints, length: Floats, place: Floats) -> Ints:
     """Minimal cover of the ends of edges by edges: what remains are stars.
 
     Edges are removed as long as both their ends keep another one, those with the best-connected
-    weaker end first, longer ones first among equals.
+    weaker end first, longer ones first among equals, and of these the first along the crack: not
+    round-off and not the numbers of nodes decide, so that the cover turns with the body.
 
     Parameters
     ----------
     pairs : (e, 2) array of int
     length : (e,) array
+    place : (e,) array
+        Along the crack, where there is such an order.
 
     Returns
     -------
@@ -427,14 +445,16 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
         Rows of `pairs` that are kept.
     """
     degree: dict[int, int] = {}
-    ends, lengths = pairs.tolist(), length.tolist()
+    ends = pairs.tolist()
+    lengths, places = _in_steps(length), _in_steps(place)
     for a, b in ends:
         degree[a] = degree.get(a, 0) + 1
         degree[b] = degree.get(b, 0) + 1
 
-    def entry(e: int) -> tuple[int, float, int, int, int]:
+    def entry(e: int) -> tuple[int, int, int, int, int, int]:
         a, b = ends[e]
-        return (-min(degree[a], degree[b]), -lengths[e], min(a, b), max(a, b), e)
+        weaker = min(degree[a], degree[b])
+        return (-weaker, -lengths[e], places[e], min(a, b), max(a, b), e)
 
     heap = [entry(e) for e in range(len(pairs))]
     heapq.heapify(heap)
@@ -452,6 +472,12 @@ def vital_edges(pairs: Ints, length: Floats) -> Ints:
         for end in ends[e]:
             degree[end] -= 1
     return np.nonzero(vital)[0]
+
+
+def _in_steps(sizes: Floats) -> list[int]:
+    """Sizes as whole numbers of steps of 1e-6 of the largest: equal ones but for round-off tie."""
+    largest = float(np.abs(sizes).max(initial=0.0))
+    return np.rint(sizes / ((_SAME * largest) or 1.0)).astype(np.int64).tolist()
 
 
 def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
@@ -505,7 +531,7 @@ def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, 
     s, before = lips.s[rows], np.cumsum(groups) - groups / 2
     density = np.where(_curved_points(lips, rows, before), 1.0, denser)
     mean = float(groups @ density / groups.sum())
-    count = max(int(mean * (groups.sum() - 1) + _BESIDES), 2)
+    count = max(int(mean * (groups.sum() - 1) + _BESIDES + 1e-9), 2)
     weight = groups * density
     knots = np.interp(np.linspace(0, weight.sum(), count), np.cumsum(weight) - weight / 2, s)
     return _knots(knots, (float(s.min()), float(s.max())), last)

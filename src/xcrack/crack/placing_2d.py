@@ -16,6 +16,7 @@ from xcrack.mesh.locate import (
     cells_around,
     cells_at,
     contains,
+    locate,
     nearest_boundary,
     parts_inside,
 )
@@ -23,6 +24,10 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import closest_on_segment
 
 ON_MESH = 1e-10  # share of a cell within which a tip lies on a mesh point or on an edge
+# Share of a cell within which a tip or kink is moved there. A tip on a mesh point and one beside it
+# have other functions, and K differs by the error of the mesh: nothing of the size of round-off, or
+# of what is lost where coordinates are written with nine digits, may decide which it is.
+_BESIDE_MESH = 1e-7
 MOUTH = 0.5  # an end within this share of a cell from the boundary is a mouth
 _MEANT = 0.1  # share of a cell inside the boundary up to which nobody means a tip
 _WAY = 3.0  # cells to the boundary, along the crack, from an end that is close to it
@@ -171,27 +176,31 @@ def _prolonged_end(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[f
     return way, np.asarray(end + out * (way + min(size, gap / 2)))
 
 
-def tips_on_mesh(crack: Crack, mesh: Mesh) -> Crack:
-    """A placed crack whose tips lie on mesh points and edges exactly, or well beside them.
+def vertices_on_mesh(crack: Crack, mesh: Mesh) -> Crack:
+    """A placed crack whose tips and kinks lie on mesh points and edges, or well beside them.
 
     What is cut between a tip and a mesh point closer than round-off allows has no area, and points
     of integration on the tip itself.
     """
     points = np.array(crack.points)
-    for tip in crack.tips or ():
-        points[tip] = _on_mesh(points[tip], mesh)
+    cell, bary = locate(mesh, points)
+    is_close = (cell >= 0) & (np.abs(bary) <= 2 * _BESIDE_MESH).any(axis=1)
+    is_close[list(crack.tips or ())] = True
+    last = {0, len(points) - 1} - set(crack.tips or ())  # mouths, and ends on other cracks
+    for number in set(np.nonzero(is_close)[0].tolist()) - last:
+        points[number] = _on_mesh(points[number], mesh)
     return replace(crack, points=lock(points))
 
 
 def _on_mesh(x: Floats, mesh: Mesh) -> Floats:
-    """A point, or the mesh point or the point of an edge that it lies on but for round-off."""
-    cells = cells_around(mesh, x, ON_MESH)
+    """A point, or the mesh point or the point of an edge that it lies on but for 1e-7 of a cell."""
+    cells = cells_around(mesh, x, _BESIDE_MESH)
     bary = barycentric(mesh, cells, np.broadcast_to(x, (len(cells), 2)))
-    count = (np.abs(bary) > ON_MESH).sum(axis=1)
+    count = (np.abs(bary) > _BESIDE_MESH).sum(axis=1)
     if count.min(initial=3) == 3:
         return x
     row = int(np.argmin(count))
-    share = np.where(np.abs(bary[row]) > ON_MESH, bary[row], 0.0)
+    share = np.where(np.abs(bary[row]) > _BESIDE_MESH, bary[row], 0.0)
     corners = mesh.points[mesh.cells[cells[row]]]
     first = corners[np.argmax(share)]  # the mesh point itself where it is alone
     return np.asarray(first + share / share.sum() @ (corners - first))

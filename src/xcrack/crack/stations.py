@@ -14,7 +14,7 @@ from xcrack.crack.front_curve import front_curve
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.junctions import Junction
 from xcrack.crack.junctions_3d import arms_placed, is_before, surface_junctions
-from xcrack.crack.placing_2d import check_lines, place_line, tips_on_mesh
+from xcrack.crack.placing_2d import check_lines, place_line, vertices_on_mesh
 from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
 from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
 from xcrack.mesh.locate import contains
@@ -35,7 +35,7 @@ _JUNCTIONS: dict[int, Callable[..., tuple[Junction, ...]]] = {
     3: surface_junctions,
 }
 _ON_MESH: dict[int, Callable[[Crack, Mesh], Crack]] = {
-    2: tips_on_mesh,
+    2: vertices_on_mesh,
     3: lambda crack, mesh: crack,
 }
 _SHORT: dict[int, Callable[[Crack, Mesh], list[ShortFront]]] = {
@@ -106,7 +106,7 @@ def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> 
 
 
 def on_mesh(crack: Crack, mesh: Mesh) -> Crack:
-    """A placed crack as the mesh is cut by it; see `placing_2d.tips_on_mesh`."""
+    """A placed crack as the mesh is cut by it; see `placing_2d.vertices_on_mesh`."""
     return _ON_MESH[mesh.dim](crack, mesh)
 
 

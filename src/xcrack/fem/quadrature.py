@@ -74,7 +74,8 @@ def _from_tips(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
     """
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
     distance = np.min([np.linalg.norm(x - tip.x, axis=2) for tip in space.tips], axis=0)
-    order = np.argsort(distance, axis=1, kind="stable")
+    steps = np.rint(distance / (1e-9 * distance.max(axis=1, keepdims=True)))
+    order = np.argsort(steps, axis=1, kind="stable")
     return np.take_along_axis(bary, order[:, :, None], axis=1)
 
 

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.locate import barycentric, cells_at
 from xcrack.model.material import Isotropic
 from xcrack.sif.sif import SIF
@@ -38,6 +39,21 @@ def weight(r: Floats, xi: Floats, inner: Floats, outer: Floats) -> tuple[Floats,
     return q, slope[..., None] * (xi / np.maximum(r, 1e-300)[:, None])[None]
 
 
+_ON_CRACK = 1e-6  # of the longest edge
+
+
+def distances_to(space: FunctionSpace, x: Floats) -> Floats:
+    """Distances of the mesh points in 2D to one of them `(n,)`; inf of those on cracks.
+
+    The displacement of a point on a crack is that of one face: which one is left to the numbering.
+    """
+    distance = np.linalg.norm(space.mesh.points - x, axis=1)
+    for cut in space.cuts:
+        is_on_crack = np.abs(cut.level_set.phi) <= _ON_CRACK * space.mesh.longest_edge
+        distance[is_on_crack] = np.inf
+    return np.asarray(distance)
+
+
 def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats:
     """Mean rotation of the mesh points around a tip or front `(d, d)`.
 
@@ -53,7 +69,7 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
     """
     points = solution.space.mesh.points
     d = points.shape[1]
-    near_points = np.nonzero(distance < radius)[0]
+    near_points = np.nonzero(distance < radius * (1 - 1e-9))[0]  # not those on the rim
     if len(near_points) <= d:
         return np.zeros((d, d))
     y, u = np.zeros((2, len(near_points), 3))  # 2D turns about the third axis

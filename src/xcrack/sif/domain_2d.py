@@ -111,7 +111,8 @@ def ring_classes(
 
     mesh = space.mesh
     near_cells = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
-    share = mesh.cell_size[near_cells] / radius
+    # A quarter of the radius is a common size: which class it is in is not left to round-off.
+    share = mesh.cell_size[near_cells] / radius * (1 - 1e-9)
     for low, high, n, degree in _DEGREES:
         cells = near_cells[(share > low) & (share <= high)]
         if len(cells):
@@ -151,7 +152,7 @@ def tip_intensities(solutions: Sequence[Solution], ends: Sequence[int]) -> list[
     list of list of SIF
         One list a tip, with one for each state.
     """
-    result = [_tip_intensity(solutions, t) for t in ends]
+    result = [intensity_at_tip(solutions, t) for t in ends]
 
     @cache
     def difference() -> float:
@@ -201,8 +202,16 @@ def _K_of_lips(solution: Solution, t: int, jump: Floats, size: float) -> Floats:
     return np.asarray(np.linalg.lstsq(columns * weight, values * weight, rcond=None)[0][0])
 
 
-def _tip_intensity(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], Domain]:
-    """K and T at one tip of each state, and the domain they are from."""
+def intensity_at_tip(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], Domain]:
+    """K and T at one tip of each state, and the domain they are from; nothing is warned of.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        States of one solve.
+    t : int
+        Number of the tip in `space.tips`.
+    """
     tip = solutions[0].space.tips[t]
     domain = domain_of(solutions[0], t)
     outer = domain.outer_radius

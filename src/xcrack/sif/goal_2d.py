@@ -17,7 +17,7 @@ from xcrack.fem.assembly import tabulate_functions
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.simplex import simplex_rule
-from xcrack.sif.common import has_effect, material_at_tip, tip_place, weight
+from xcrack.sif.common import distances_to, has_effect, material_at_tip, tip_place, weight
 from xcrack.sif.domain_2d import class_points, domain_of, radii_of, ring_classes, ring_parts
 from xcrack.sif.interaction_2d import (
     ahead_derivative,
@@ -108,7 +108,8 @@ def _rotation(solution: Solution, t: int, outer: float) -> Floats:
     """Mean rotation of the mesh points around the tip as a functional; see `mean_rotation`."""
     points = solution.space.mesh.points
     result = np.zeros_like(points)
-    near_points = np.nonzero(np.linalg.norm(points - solution.space.tips[t].x, axis=1) < outer)[0]
+    distance = distances_to(solution.space, solution.space.tips[t].x)
+    near_points = np.nonzero(distance < outer * (1 - 1e-9))[0]
     if len(near_points) > points.shape[1]:
         y = points[near_points] - points[near_points].mean(axis=0)
         result[near_points] = np.stack([-y[:, 1], y[:, 0]], axis=1) / (y * y).sum()

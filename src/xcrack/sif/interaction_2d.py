@@ -36,6 +36,7 @@ from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import simplex_rule
 from xcrack.model.material import Isotropic
 from xcrack.sif.common import (
+    distances_to,
     has_effect,
     lip_pressure,
     lip_shear,
@@ -102,7 +103,7 @@ class IntegrationRing:
 def ring_around(solutions: Sequence[Solution], t: int, radii: Floats) -> IntegrationRing:
     """The domains around tip t with the given outer radii."""
     space = solutions[0].space
-    distance = np.linalg.norm(space.mesh.points - space.tips[t].x, axis=1)
+    distance = distances_to(space, space.tips[t].x)
     turns = [mean_rotation(s, distance, float(radii.max())) for s in solutions]
     coefficients = np.stack([s.coefficients for s in solutions], axis=-1)
     return IntegrationRing(

@@ -26,7 +26,15 @@ from xcrack.fem.loads import position
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar
 from xcrack.model.material import Isotropic
-from xcrack.sif.common import has_effect, lip_pressure, lip_shear, mean_rotation, tip_cells, weight
+from xcrack.sif.common import (
+    distances_to,
+    has_effect,
+    lip_pressure,
+    lip_shear,
+    mean_rotation,
+    tip_cells,
+    weight,
+)
 from xcrack.sif.domain_2d import class_points, domain_of, radii_of, ring_classes
 
 _INNER = 0.15  # inner radius of the ring in which the weight falls, as a share of the outer one
@@ -275,7 +283,7 @@ def _ring_points(solution: Solution, t: int, hollow: float, outer: float) -> Ite
     space, tip = solution.space, solution.space.tips[t]
     mesh, R = space.mesh, tip.frame
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
-    distance = np.linalg.norm(mesh.points - tip.x, axis=1)
+    distance = distances_to(space, tip.x)
     turn = mean_rotation(solution, distance, outer)
     for cells, n, degree in ring_classes(space, tip.x, hollow, outer):
         for points in class_points(space, cells, n, degree):

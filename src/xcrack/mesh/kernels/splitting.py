@@ -445,7 +445,8 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore
                 size = max(size, edge)
             is_close = False
             for t in range(len(tips)):
-                if size > _distance(tips[t, 0], tips[t, 1], corner):
+                # Equal lengths are common in regular meshes: round-off must not decide.
+                if size > (1.0 + _SAME) * _distance(tips[t, 0], tips[t, 1], corner):
                     is_close = True
                     break
             if not is_close or level == levels:

@@ -1,0 +1,164 @@
+"""Bars of K in 2D where one solution gives none: a second one, with smaller cells there.
+
+Cells that are too large for an estimate (a crack, or the room to a boundary, another tip, a kink or
+another material, of less than a few of them) become small enough for it: K of the second solution
+with its own bar is then what is known. Where nothing is estimated, as with friction, cells along
+all faces become smaller, and the change of K is the bar.
+"""
+
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from xcrack.analysis.solution import Solution
+from xcrack.analysis.solve import solve_states
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.errors import XcrackError, XcrackWarning
+from xcrack.mesh.locate import cell_sizes
+from xcrack.mesh.refinement import refine
+from xcrack.sif.domain_2d import intensity_at_tip
+from xcrack.sif.sif import SIF, KErrors, bars_of, joined
+
+_GROWS = 0.3  # by which cells grow with the distance from where they are smallest
+_HALF = 0.5  # of a cell, where nothing is estimated
+# Of the change of both modes of K to the second solution: what is added, as squares are, where that
+# has a bar of its own; of the largest change of a crack, least half-width where it has none.
+_ADDED, _LEAST = 0.05, 0.5
+# Reasons that smaller cells do not take away, and that the change of K does not show.
+_STAYS = (
+    "order 1", "contact by", "the faces press at the kink",
+    "parts of the boundary look like chords",
+)  # fmt: skip
+_CHUNK = 2_000_000  # distances at once
+
+Bars = Callable[[Sequence[Solution], Sequence[SIF], int], list[KErrors]]
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where cells become smaller.
+
+    Attributes
+    ----------
+    x : (k, 2) array, length
+    size : (k,) array, length
+        Longest edge wanted there.
+    """
+
+    x: Floats
+    size: Floats
+
+    def size_at(self, x: Floats) -> Floats:
+        """Wanted size of cells at points `(n,)`."""
+        step = max(_CHUNK // max(len(self.x), 1), 1)
+        parts = [x[k : k + step] for k in range(0, len(x), step)]
+        return np.concatenate([
+            (self.size + _GROWS * np.linalg.norm(part[:, None] - self.x, axis=2)).min(axis=1)
+            for part in parts
+        ])  # fmt: skip
+
+
+def has_help(reason: str) -> bool:
+    """Whether smaller cells give a bar where there is none for a reason."""
+    return bool(reason) and not reason.startswith(_STAYS)
+
+
+def along_faces(solution: Solution) -> Places:
+    """All crack faces, with cells of half the size."""
+    x = np.concatenate([lips.x for lips in solution.lips])
+    return Places(x, _HALF * cell_sizes(solution.problem.mesh, x))
+
+
+def finer_solutions(solutions: Sequence[Solution], places: Places) -> list[Solution]:
+    """The same states with smaller cells at some places, order 2; the factor is kept.
+
+    Where these solutions kept theirs, the second ones stay with it: cracks share them.
+    """
+    factored = solutions[0].factored
+    key = ("finer", tuple(s.number for s in solutions), places.x.tobytes(), places.size.tobytes())
+    if factored is not None and key in factored.around_tips:
+        found: list[Solution] = factored.around_tips[key]
+        return found
+    problem = solutions[0].problem
+    scene = replace(problem, mesh=refine(problem.mesh, size=places.size_at), order=2)
+    result = solve_states(scene, [s.state for s in solutions], error=True)
+    if factored is not None:
+        factored.around_tips[key] = result
+    return result
+
+
+def bars_by_finer_cells(
+    solutions: Sequence[Solution],
+    sifs: Sequence[SIF],
+    bars: Sequence[KErrors],
+    crack: int,
+    places: Places,
+    estimate: Bars,
+) -> list[KErrors]:
+    """Bars of one crack, where there were none from a second solution.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    sifs : sequence of SIF
+        One for each.
+    bars : sequence of KErrors
+        Those of one solution, with reasons where there is none.
+    crack : int
+    places : Places
+    estimate : callable
+        Bars of the second solution by its factor.
+
+    Returns
+    -------
+    list of KErrors
+        As they were where the second solution is refused, or has other tips.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", XcrackWarning)  # those of the first solution count
+        try:
+            finer = finer_solutions(solutions, places)
+        except XcrackError:
+            return list(bars)
+        tips = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
+        by_tip = [intensity_at_tip(finer, t)[0] for t in tips]
+    if len(tips) != len(sifs[0].K):
+        return list(bars)
+    second = [joined([states[k] for states in by_tip], 2) for k in range(len(finer))]
+    of_second = estimate(finer, second, crack)
+    every = zip(sifs, bars, second, of_second, strict=True)
+    return [_together(*one) for one in every]
+
+
+def _together(sif: SIF, bars: KErrors, second: SIF, of_second: KErrors) -> KErrors:
+    """Bars of one state, from the second solution where the first has none."""
+    left = [r if r.startswith(_STAYS) else "" for r in bars.reasons]
+    left = [a or (b if b.startswith(_STAYS) else "") if r else "" for a, b, r in
+            zip(left, of_second.reasons, bars.reasons, strict=True)]  # fmt: skip
+    is_missing = np.array([bool(reason) for reason in bars.reasons], dtype=bool)
+    is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
+    best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
+    eta = best - sif.K
+    eta[sif.closed, 0] = 0.0  # K_I of closed tips is zero
+    change = np.abs(eta)
+    both = np.linalg.norm(eta, axis=1, keepdims=True)
+    half = np.maximum(change, _LEAST * both.max(initial=0.0))
+    known = np.hypot(of_second.bar, _ADDED * both)
+    bar = np.where(is_known[:, None], known, half)
+    shut = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
+    bar[sif.closed, 0] = shut[sif.closed]
+    contact = np.zeros_like(bar) if of_second.contact is None else np.array(of_second.contact)
+    contact = np.where(is_known[:, None], contact, 0.0)
+    first = np.zeros_like(bar) if bars.contact is None else bars.contact
+    rows = is_missing[:, None]
+    return bars_of(
+        np.where(rows, eta, bars.eta),
+        np.where(rows, bar, bars.bar),
+        left,
+        np.where(rows, contact, first),
+    )
+
+
+__all__: list[str] = []
