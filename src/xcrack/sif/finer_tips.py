@@ -19,7 +19,7 @@ from xcrack.base.errors import XcrackError, XcrackWarning
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.refinement import refine
 from xcrack.sif.domain_2d import intensity_at_tip
-from xcrack.sif.sif import SIF, KErrors, bars_of, joined
+from xcrack.sif.sif import SIF, KErrors, bars_of, joined_sif
 
 _GROWS = 0.3  # by which cells grow with the distance from where they are smallest
 _HALF = 0.5  # of a cell, where nothing is estimated
@@ -126,7 +126,7 @@ def bars_by_finer_cells(
         by_tip = [intensity_at_tip(finer, t)[0] for t in tips]
     if len(tips) != len(sifs[0].K):
         return list(bars)
-    second = [joined([states[k] for states in by_tip], 2) for k in range(len(finer))]
+    second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer))]
     of_second = estimate(finer, second, crack)
     every = zip(sifs, bars, second, of_second, strict=True)
     return [_together(*one) for one in every]
