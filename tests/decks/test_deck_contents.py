@@ -257,7 +257,7 @@ def test_an_archive_of_ansys(tmp_path):
         (text.replace("       -1\nCMBLOCK,TOP", "CMBLOCK,TOP"), r"line \d+: .*no whole number"),
         (text.replace("EBLOCK,19,SOLID", "EBLOCK,19"), "CDWRITE"),
         (text.replace("        7        8\n", "        7       88\n"), "node 88, which the file"),
-        (text[: text.index("N,R5")], "no end: the file is cut off"),
+        (text[: text.index("N,R5")], "no end, the file is cut off"),
     ]:
         path.write_text(wrong)
         with pytest.raises(xc.MeshError, match=says):

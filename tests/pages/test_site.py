@@ -24,6 +24,17 @@ def test_the_gallery_has_a_picture_and_the_words_of_each_example():
             assert (gallery / f"{script.stem}.txt").read_text(encoding="utf-8").strip()
 
 
+def test_every_picture_is_shown():
+    """On a page, or in the gallery with its example."""
+    figures = ROOT / "docs" / "figures"
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages)
+    examples = tuple(f"{script.stem}_" for script in (ROOT / "examples").glob("*.py"))
+    for picture in figures.rglob("*.png"):
+        name = picture.relative_to(figures).as_posix()
+        assert name in text or picture.name.startswith(examples), f"{name} is shown nowhere"
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(bool(MISSING), reason=f"site not available: no {', '.join(MISSING)}")
 def test_the_site_has_no_warning(tmp_path):

@@ -1,11 +1,12 @@
 """A case file read: problem, load states, growth, what is made of it, where the results go."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -177,7 +178,7 @@ def _problem(root: Table) -> Problem:
             given_bodies[-1] if given_bodies else "",
             "give one of [mesh], [deck] and [specimen]."
             if given_bodies
-            else "the table [mesh] is missing: give it.",
+            else "there is no body: give one of [mesh], [deck] and [specimen].",
         )
     scene: dict[str, Any] = {}
     if "material" in root:
@@ -217,7 +218,24 @@ def _problem(root: Table) -> Problem:
             return deck.problem(**scene, **chosen)  # type: ignore[no-any-return]
         return specimen.problem(**scene, **chosen)  # type: ignore[no-any-return]
     except XcrackError as error:
-        (solving if chosen else root).wrap(error)
+        _wrap(root, error)
+
+
+_SPEAKS_OF = {  # words of an error of a problem, and the table that it is about
+    "material": r"plane=|\bmaterial\b|Isotropic|Graded",
+    "solve": r"\b(contact|order|friction)\b",
+    "cracks": r"\bcracks?\b",
+}
+
+
+def _wrap(root: Table, error: XcrackError) -> NoReturn:
+    """Raise an error of a problem with the line of what it speaks of."""
+    for name, words in _SPEAKS_OF.items():
+        if name in root and re.search(words, str(error)):
+            if name == "cracks":
+                root.wrap(error, name)
+            root.table(name).wrap(error)
+    root.wrap(error)
 
 
 def _loads_with_deck(body: Any, scene: Mapping[str, Any]) -> dict[str, Any]:

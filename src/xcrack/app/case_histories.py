@@ -116,7 +116,7 @@ def retardation_of(table: Table) -> Retardation | dict[str, Retardation]:
 
 def _model(table: Table) -> Retardation:
     if "zone" not in table:
-        table.refuse("", "the key 'zone' is missing: zone = { sigma_y = ..., beta = ... }.")
+        table.refuse("", "the key 'zone' is missing: give zone = { sigma_y = ..., beta = ... }.")
     return value_of_table(table, _MODELS)  # type: ignore[no-any-return]
 
 

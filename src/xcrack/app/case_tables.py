@@ -109,15 +109,18 @@ class Table:
             return self.source.units.number(value, dimension)
         return value
 
-    def wrap(self, error: XcrackError | TypeError) -> NoReturn:
-        """Raise an error of a function that this table was given to, with file and line."""
+    def wrap(self, error: XcrackError | TypeError, about: str = "") -> NoReturn:
+        """Raise an error of a function that this table was given to, with file and line.
+
+        It is about a key, where that is known; else about the first that it names.
+        """
         text = str(error)
         places = {
             name: match.start()
             for name in self.content
             if (match := re.search(rf"\b{re.escape(name)}\b", text))
         }
-        key = min(places, key=places.__getitem__, default="")  # what it speaks of first
+        key = about or min(places, key=places.__getitem__, default="")
         place = (*self.key, key) if key else self.key
         kind = type(error) if isinstance(error, XcrackError) else ProblemError
         line = self.source.line(place)
@@ -144,7 +147,7 @@ def read_tables(path: Path, changes: Mapping[str, Any] | None = None) -> Table:
         place = re.search(r"line (\d+)", str(error))
         line = int(place[1]) if place else text.count("\n") + 1
         raise ProblemError(
-            f"{path}, line {line}: this is no toml ({error}); texts stand in quotes, lists in [ ]."
+            f"{path}, line {line}: this is no toml: {_words_of_toml(str(error))}."
         ) from error
     except RecursionError as error:
         raise ProblemError(
@@ -161,6 +164,35 @@ def read_tables(path: Path, changes: Mapping[str, Any] | None = None) -> Table:
     except ProblemError as error:
         units.wrap(error)
     return Table(Source(path, source.lines, units_of_file), (), content)
+
+
+# What tomllib says, and what a reader is to do.
+_TOML = {
+    "Cannot overwrite a value": "the key stands here a second time: leave one of them out",
+    r"Cannot declare \('?(.*?)'?,?\) twice": "the table [{}] begins a second time: put its keys "
+    "together, or write [[{}]] for each of a list",
+    "Cannot mutate immutable|Cannot redefine": "this table was given in one line before: put all "
+    "keys into that",
+    "Expected '='": "a line is `key = value`, a table [name] or a remark behind #: write one",
+    "Invalid statement": "a line is `key = value`, a table [name] or a remark behind #: write one",
+    "Invalid value": "the value is no number, text in quotes, true, false or list: give one",
+    "Unclosed array": "a list is not closed: write ]",
+    "Unclosed inline": "a table in one line is not closed: write }}",
+    "Expected '\\]": "the name of a table is not closed: write ]",
+    'Illegal character|Unterminated|Expected "|end of document|Unescaped': "a text is not closed "
+    "or holds a sign that it may not: write it in one line between quotes",
+    "Expected newline": "more stands behind the value: write one key a line, texts in quotes",
+}
+
+
+def _words_of_toml(reason: str) -> str:
+    """An error of tomllib as what to do about it."""
+    for pattern, words in _TOML.items():
+        if match := re.match(pattern, reason):
+            name = match[1].replace("', '", ".") if match.groups() else ""
+            return words.format(name, name)
+    plain = re.sub(r" \(at .*?\)$", "", reason)
+    return f"{plain}; texts stand in quotes, lists in [ ]: write it so"
 
 
 def _change(content: dict[str, Any], key: str, value: Any, path: Path) -> None:

@@ -173,6 +173,8 @@ def value_of_table(
         No such kind, a key that is unknown or missing, a wrong unit, or what the function says;
         with file and line.
     """
+    if _WORD not in table and not default:
+        table.refuse("", f"the key 'kind' is missing: give one of {', '.join(makers)}.")
     kind = table.text(_WORD, default or None)
     if kind not in makers:
         table.refuse(_WORD, f"{kind!r:.40} is not known: known are {', '.join(makers)}.")

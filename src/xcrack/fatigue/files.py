@@ -1,7 +1,7 @@
 """Load histories from text files."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -81,14 +81,22 @@ def read_spectrum(
     data = np.array(table)
     if rows:
         if data.shape[1] != 3:
-            raise ProblemError(f"{file}: {data.shape[1]} numbers a line: rows are min, max, count.")
-        return Spectrum(rows=data, unit=unit)
+            raise ProblemError(f"{file}: {data.shape[1]} numbers a line: give min, max and count.")
+        return _spectrum_of(file, rows=data, unit=unit)
     if column is None and data.shape[1] > 1:
         raise ProblemError(f"{file}: {data.shape[1]} columns: give column= or rows=True.")
     k = column or 0
     if k >= data.shape[1]:
         raise ProblemError(f"{file}: there is no column {k}: give 0 to {data.shape[1] - 1}.")
-    return Spectrum(data[:, k], unit=unit)
+    return _spectrum_of(file, factors=data[:, k], unit=unit)
+
+
+def _spectrum_of(file: Path, **given: Any) -> Spectrum:
+    """A spectrum of numbers of a file, which errors name."""
+    try:
+        return Spectrum(**given)
+    except ProblemError as error:
+        raise ProblemError(f"{file}: {error}") from error
 
 
 # TWIST, the flight-by-flight spectrum of the lower wing skin of a transport aircraft.

@@ -635,7 +635,9 @@ class _Builder:
                     owners += [pair[0] for pair in pairs]
                     faces += [pair[1] for pair in pairs]
                 elif face not in ("SPOS", "SNEG"):  # sides of a shell
-                    keyword.refuse(f"the face {face!r:.20} is not known: S1 to S6 are.", number)
+                    keyword.refuse(
+                        f"the face {face!r:.20} is not known: give one of S1 to S6.", number
+                    )
             key = scope, name.casefold()
             known = result.get(key)
             if known is not None and known.faces is not None:

@@ -21,26 +21,26 @@ from xcrack.base.errors import GeometryError, MeshError, XcrackError, warn
 from xcrack.base.optional import require_package
 from xcrack.base.paths import system_errors, written_whole
 from xcrack.mesh.abaqus import abaqus_text, read_abaqus
+from xcrack.mesh.ansys import read_ansys
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.curves import Curve, check_on_curves
 from xcrack.mesh.keywords import KeywordUse, missed_words
 from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.msh import REST, msh_text
-from xcrack.mesh.other_decks import nastran_uses, read_ansys
+from xcrack.mesh.nastran import read_nastran
 from xcrack.mesh.polygon import Arc
 from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
 _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}
-_TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "su2:tag")
+_TAGS = ("gmsh:physical", "medit:ref", "cell_tags", "su2:tag")
 _ENTITY_TAGS = "gmsh:geometrical"
 _WITH_GMSH = "Let gmsh convert it, which keeps its groups: gmsh {0} -save -o {1}.msh."
 _NASTRAN = (".bdf", ".nas", ".fem")
 _SHAPE = 'It is a shape without a mesh: xcrack.mesh_step("{0}", size=...) meshes it.'
 _CONVERT = {  # formats that meshio does not read, or not always
     ".unv": _WITH_GMSH,
-    **dict.fromkeys(_NASTRAN, _WITH_GMSH),
     **dict.fromkeys((".step", ".stp"), _SHAPE),
     ".odb": "It is an output database, which Abaqus alone opens: give the input file (.inp) of the "
     "same job, which has mesh, sets and loads.",
@@ -133,11 +133,9 @@ def raw_mesh_of(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
         return read_abaqus(path)
     if suffix == ".cdb":
         return read_ansys(path)
-    raw = _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path))
-    if suffix not in _NASTRAN:
-        return raw, []
-    n_cells = sum(len(rows) for kind, rows in raw.blocks if SHAPES[base_kind(kind) or ""].dim > 1)
-    return raw, nastran_uses(path, n_cells)
+    if suffix in _NASTRAN:
+        return read_nastran(path)
+    return _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path)), []
 
 
 def sets_without_facets(raw: RawMesh, mesh: Mesh) -> str:

@@ -89,8 +89,8 @@ def mesh_parts(
     if not len(doubled):
         content = ", ".join(f"{len(data)} {kind}" for kind, data in raw.blocks) or "nothing"
         raise MeshError(
-            f"{source} has no triangles and no tetrahedra (it has {content}). In gmsh, mesh the "
-            "surface or volume, and if there are physical groups, put it into one."
+            f"{source} has no triangles and no tetrahedra (it has {content}): mesh the surface or "
+            "volume and export its elements; in gmsh, where there are physical groups, in one."
         )
     if doubled.min() < 0 or doubled.max() >= len(raw.points):
         raise MeshError(
@@ -103,7 +103,10 @@ def mesh_parts(
     new = np.full(len(points), -1, dtype=np.int64)
     new[used] = np.arange(len(used))
     points, cells = points[used], new[cells]
-    bare = sound_mesh(points, cells)
+    try:
+        bare = sound_mesh(points, cells)
+    except MeshError as error:
+        raise MeshError(f"{source}: {error}") from error
     facet_sets = _facet_sets(raw, bare, new, source)
     cell_sets = {
         name: np.sort(_row_numbers(cells, new[members]))

@@ -1,7 +1,6 @@
-"""Decks of Ansys (cdb) and Nastran (bdf): what becomes of their commands and cards.
+"""Archives of Ansys (cdb): nodes, elements and components, and what becomes of other commands.
 
-An archive that Ansys writes with CDWRITE has its nodes, elements and components in blocks of fixed
-width. The mesh of a Nastran deck is read by meshio; here is told which of its cards were taken.
+What CDWRITE writes has its nodes, elements and components in blocks of fixed width.
 """
 
 import re
@@ -42,11 +41,7 @@ _SETTINGS = (
 # Loads of the whole body that an archive always has, mostly zero.
 _ALWAYS = ("ACEL OMEGA DOMEGA CGLOC CGOMEGA DCGOMG CMOMEGA TREF BFUNIF ALPHAD BETAD DMPRAT "
            "DMPSTR").split()  # fmt: skip
-_CARDS = {"GRID": "nodes", "CTETRA": "cells", "CHEXA": "cells", "CPENTA": "cells",
-          "CPYRA": "cells", "CPYRAM": "cells", "CTRIA3": "triangles", "CTRIA6": "triangles",
-          "CQUAD4": "quadrilaterals", "CQUAD8": "quadrilaterals", "CTRIAR": "triangles",
-          "CQUADR": "quadrilaterals"}  # fmt: skip
-_BULK_SETTINGS = ("PARAM", "ENDDATA", "ECHOON", "ECHOOFF", "INCLUDE")
+_AGAIN = "write the archive again with CDWRITE, DB"
 _NOT_MESH = "it is not of the mesh"
 
 
@@ -121,7 +116,12 @@ class _Archive:
             for _ in range(int(n))
         ]
         if not columns:
-            _refuse(self.path, line, f"the format {text.strip()!r:.40} of the block is not known.")
+            _refuse(
+                self.path,
+                line,
+                f"the block has the format {text.strip()!r:.40}, and not such as "
+                f"(3i9,6e21.13e3): {_AGAIN}.",
+            )
         return [width for _, width in columns], sum(kind == "i" for kind, _ in columns)
 
     def take_nodes(self, line: int) -> None:
@@ -137,10 +137,10 @@ class _Archive:
             try:
                 x = [float(numbers_of_text(entry)) if entry else 0.0 for entry in entries]
             except ValueError:
-                _refuse(self.path, number, f"{text.strip()!r:.60} is no node.")
+                _refuse(self.path, number, f"{text.strip()!r:.60} is no node: {_AGAIN}.")
             self.rows[label] = len(self.points)
             self.points.append([*x, 0.0, 0.0, 0.0][:3])
-        _refuse(self.path, line, "the block of nodes has no end: the file is cut off.")
+        _refuse(self.path, line, f"the nodes have no end, the file is cut off: {_AGAIN}.")
 
     def take_elements(self, line: int, entries: Sequence[str]) -> None:
         """A block of elements in the format of solids: eleven entries and the nodes."""
@@ -156,14 +156,14 @@ class _Archive:
             if given:
                 given += row
             elif len(row) < _ENTRIES:
-                _refuse(self.path, number, f"{text.strip()!r:.60} is no element.")
+                _refuse(self.path, number, f"{text.strip()!r:.60} is no element: {_AGAIN}.")
             else:
                 given = row
             if len(given) - _ENTRIES >= given[8]:
                 nodes = given[_ENTRIES : _ENTRIES + given[8]]
                 self.elements.append((given[10], given[1], nodes))
                 given = []
-        _refuse(self.path, line, "the block of elements has no end: the file is cut off.")
+        _refuse(self.path, line, f"the elements have no end, the file is cut off: {_AGAIN}.")
 
     def take_component(self, line: int, entries: Sequence[str]) -> None:
         """A component: numbers of nodes or elements, a negative one closes a range."""
@@ -177,7 +177,7 @@ class _Archive:
             number, text = next(self._lines, (line, ""))
             pieces = [text[k : k + width] for k in range(0, len(text.rstrip()), width)]
             if not pieces:
-                _refuse(self.path, number, f"the component {entries[0]!r} is cut off.")
+                _refuse(self.path, number, f"the component {entries[0]!r} is cut off: {_AGAIN}.")
             for piece in pieces:
                 value = _whole_entry(piece, self.path, number)
                 members += range(members[-1] + 1, -value + 1) if value < 0 and members else [value]
@@ -202,12 +202,13 @@ class _Archive:
                 rows.append([self.rows[node] for node in nodes])
             except KeyError as error:
                 raise MeshError(
-                    f"{self.path.name}: element {number} names node {error}, which the file lacks."
+                    f"{self.path.name}: element {number} names node {error}, which the file lacks: "
+                    f"{_AGAIN}."
                 ) from error
         for kind, rows in blocks.items():
             if len({len(row) for row in rows}) > 1:
                 raise MeshError(
-                    f"{self.path.name}: {kind} elements have different numbers of nodes."
+                    f"{self.path.name}: {kind} elements have different numbers of nodes: {_AGAIN}."
                 )
         arrays = {kind: np.array(rows, dtype=np.int64) for kind, rows in blocks.items()}
         sets: list[tuple[str, str, Ints]] = []
@@ -244,60 +245,6 @@ class _Archive:
         return uses
 
 
-def nastran_uses(path: Path, n_cells: int) -> list[KeywordUse]:
-    """What becomes of the cards of a Nastran deck whose mesh meshio reads.
-
-    Parameters
-    ----------
-    path : Path
-    n_cells : int
-        Elements that meshio has read.
-
-    Raises
-    ------
-    MeshError
-        Points in a coordinate system of their own, or elements that meshio does not know: the mesh
-        would be another one.
-    """
-    counts: dict[str, list[int]] = {}
-    in_bulk = False
-    for number, line in enumerate(
-        path.read_text(encoding="utf-8", errors="replace").splitlines(), 1
-    ):
-        text = line.split("$")[0].rstrip()
-        if not in_bulk:
-            in_bulk = text.strip().upper().startswith("BEGIN BULK")
-            continue
-        if not text or text[0] in " +*,":
-            continue
-        fields = [f.strip() for f in text.split(",")] if "," in text else _columns(text)
-        name = fields[0].upper().rstrip("*")
-        counts.setdefault(name, [0, number])[0] += 1
-        if name == "GRID" and len(fields) > 2 and fields[2] not in ("", "0"):
-            _refuse(
-                path, number, f"the point is given in the coordinate system {fields[2]}: let "
-                "Nastran or gmsh write the deck with points in the basic system (CP = 0)."
-            )  # fmt: skip
-    taken = (
-        sum(count for name, (count, _) in counts.items() if name in _CARDS)
-        - counts.get("GRID", [0])[0]
-    )
-    if taken > n_cells:
-        raise MeshError(
-            f"{path.name} has {taken} elements of solids and surfaces, of which meshio reads "
-            f"{n_cells}: those in large fields (CTETRA*) are not known to it. Write the deck with "
-            f"small fields, or let gmsh convert it: gmsh {path.name} -save -o {path.stem}.msh."
-        )
-    return [
-        KeywordUse(
-            name, count, f"{path.name}, line {line}", name in _CARDS,
-            _CARDS.get(name, "a setting" if name in _BULK_SETTINGS else _NOT_MESH),
-            name in _BULK_SETTINGS,
-        )
-        for name, (count, line) in counts.items()
-    ]  # fmt: skip
-
-
 def _is_load(entry: str) -> bool:
     """Whether an entry is a number other than zero."""
     try:
@@ -306,21 +253,15 @@ def _is_load(entry: str) -> bool:
         return False
 
 
-def _columns(text: str) -> list[str]:
-    """Fields of a card of fixed width: eight columns, or sixteen after a star."""
-    width = 16 if "*" in text[:8] else 8
-    return [text[:8].strip(), *(text[k : k + width].strip() for k in range(8, len(text), width))]
-
-
 def _whole_entry(text: str, path: Path, line: int) -> int:
     try:
         return int(text)
     except ValueError:
-        _refuse(path, line, f"{text.strip()!r:.40} is no whole number.")
+        _refuse(path, line, f"{text.strip()!r:.40} is no whole number, where one stands: {_AGAIN}.")
 
 
 def _refuse(path: Path, line: int, words: str) -> NoReturn:
     raise MeshError(f"{path.name}, line {line}: {words}")
 
 
-__all__ = ["nastran_uses", "read_ansys"]
+__all__ = ["read_ansys"]
