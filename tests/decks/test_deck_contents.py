@@ -182,7 +182,7 @@ REFUSED = {
     "*CLOAD\nLEFT, 6, 3.\n": r"take no moments.*DISTRIBUTING",
     "*CLOAD\nLEFT, 7, 3.\n": r"direction 7 is none: give one of 1 to 6",
     "*BOUNDARY\nLEFT, 11, 11, 3.\n": r"directions 11 to 11: 1 to 3 are displacements",
-    "*DLOAD\nEALL, P1NU, 3.\n": r"the load P1NU is not known: GRAV",
+    "*DLOAD\nEALL, P1NU, 3.\n": r"there is no load P1NU: give GRAV",
     "*DLOAD\nEALL, P3, 3.\n": r"P acts on faces inside the body",
     "*DSLOAD\nSGONE, P, 3.\n": r"no surface 'SGONE' of element faces; it has SLEFT",
     "*STEP\n*FREQUENCY\n5\n*END STEP\n": r"step 'Step-1' is no static one",

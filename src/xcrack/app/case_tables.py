@@ -170,7 +170,7 @@ def read_tables(path: Path, changes: Mapping[str, Any] | None = None) -> Table:
 _TOML = {
     "Cannot overwrite a value": "the key stands here a second time: leave one of them out",
     r"Cannot declare \('?(.*?)'?,?\) twice": "the table [{}] begins a second time: put its keys "
-    "together, or write [[{}]] for each of a list",
+    "together; each entry of a list begins with two brackets, as [[loads]]",
     "Cannot mutate immutable|Cannot redefine": "this table was given in one line before: put all "
     "keys into that",
     "Expected '='": "a line is `key = value`, a table [name] or a remark behind #: write one",
@@ -190,7 +190,7 @@ def _words_of_toml(reason: str) -> str:
     for pattern, words in _TOML.items():
         if match := re.match(pattern, reason):
             name = match[1].replace("', '", ".") if match.groups() else ""
-            return words.format(name, name)
+            return words.format(name)
     plain = re.sub(r" \(at .*?\)$", "", reason)
     return f"{plain}; texts stand in quotes, lists in [ ]: write it so"
 

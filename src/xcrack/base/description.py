@@ -1,6 +1,7 @@
 """Values as text: the same lines for the same settings, in any process."""
 
 import hashlib
+import inspect
 import json
 import re
 import sys
@@ -234,6 +235,7 @@ class Description:
     ) -> None:
         module = function.__module__
         if (module or "").startswith(_OWN):
+            function = inspect.unwrap(function)  # what checks its arguments is no setting
             self.lines[name] = f"xcrack.{function.__qualname__}"
             for key, cell in zip(function.__code__.co_freevars, function.__closure__ or ()):
                 self.add(f"{name}.{key}", cell.cell_contents, owners, used)

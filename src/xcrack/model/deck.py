@@ -531,7 +531,7 @@ class _Scene:
         direction = np.array(numbers[: body.dim])
         if one.label == "TRVEC" and len(direction) == body.dim and direction.any():
             return [traction(where, value * direction / np.linalg.norm(direction))]
-        one.refuse(f"the load {one.label} is not known: P, HP and TRVEC on faces are.")
+        one.refuse(f"there is no load {one.label}: give P, HP or TRVEC on faces.")
         return []
 
     def _volume_force(self, one: SpreadLoad, members: Ints) -> Any:
@@ -546,8 +546,8 @@ class _Scene:
             vector = value * vector / (np.linalg.norm(vector) or 1.0)
         else:
             one.refuse(
-                f"the load {one.label} is not known: GRAV, CENTRIF, BX, BY and BZ on elements, P, "
-                "HP and TRVEC on faces are."
+                f"there is no load {one.label}: give GRAV, CENTRIF, BX, BY or BZ on elements, P, "
+                "HP or TRVEC on faces."
             )
         if np.isnan(factor).any():
             one.refuse(f"{one.label} needs the *DENSITY of each material.")

@@ -256,7 +256,8 @@ def rerun_section(source: Source) -> Section:
         parts.append(element("p", "Run the script or the case file that made this again; equal "
                              "hashes say that mesh and cracks are the same."))  # fmt: skip
     if settings:
-        body = table((), [(k, setting_words(v)) for k, v in sorted(settings.items())], scroll=True)
+        rows = [(k, setting_words(v)) for k, v in sorted(settings.items()) if v != "None"]
+        body = table((), rows, scroll=True)
         parts.append(Markup(f"<details><summary>settings of the run</summary>{body}</details>"))
     return Section("again", "Inputs, versions, and how to run it again", join_parts(*parts),
                    {"versions": software, "hashes": hashes, "settings": settings})  # fmt: skip
