@@ -275,6 +275,20 @@ def test_fronts_are_open_and_led_outside(case, cube, body):
         np.testing.assert_array_equal(one, other)
 
 
+def test_a_small_crack_in_a_corner_is_followed_by_its_front_outside():
+    """A front that left its outline at the sides went on at 45 degrees, and its ends ran ahead."""
+    coarse = xc.box((-1, -1, -1), (1, 1, 1), 8)  # radius 1.85 cells
+    corner = np.array([-1.0, -1.0, 0.04])
+    placed = place_surface(penny_crack(corner, (0, 0, 1), 0.8), coarse)
+    (front,) = placed.fronts
+    x = placed.points[front]
+    depth, size = Body.of(coarse).depth(x)[0], Body.of(coarse).cell_size(x)
+    near = depth <= 1.25 * size
+    assert (near & (depth > size)).any()
+    np.testing.assert_allclose(np.linalg.norm(x[near] - corner, axis=1), 0.8, rtol=1e-12)
+    assert (depth[[0, -1]] > 1.9 * size[[0, -1]]).all()
+
+
 def test_straight_front_ends_on_the_surface_and_goes_on_straight(cube):
     placed = place_surface(rectangle(-1, 0.1, -1, 1), cube)
     (front,) = front_frames(placed)

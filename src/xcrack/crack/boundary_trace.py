@@ -13,7 +13,7 @@ from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
 SIDE = 0.75  # sides of a front are at most this share of a cell long
 OUTSIDE = 2.0  # cells by which an open front leaves the body
 SMOOTH = np.cos(np.radians(30.0))  # an outline that turns by more has a corner
-_LEAST = 1.25  # cells by which an old front may still be outside
+_LEAST = 1.25  # cells by which an old front may still be outside, and that an outline is followed
 _REACH = 12.0  # cells within which a way out of the body is sought
 _INSIDE = 4.0  # cells of the body that lie at most on this way
 _STEP = 0.125  # of a cell, in this search
@@ -254,7 +254,7 @@ def _led_out(
     m = len(x)
     step = int((vertex[1] - vertex[0] + 1) % m) - 1
     along = unit(x[vertex[0]] - x[(vertex[0] - step) % m])
-    tangent, leaves, corner = along, -1, False
+    tangent, leaves, corner, followed = along, -1, False, False
     for k in range(room + 1):
         at = vertex[k]
         if leaves < 0 and depth[at] >= -ON * size[at]:
@@ -262,13 +262,15 @@ def _led_out(
         enough = _LEAST if k > 0 and old[k - 1] and not old[k] else 0.999 * OUTSIDE
         if depth[at] >= enough * size[at]:
             return k, np.zeros(3)
+        if not followed and depth[at] >= _LEAST * size[at]:
+            leaves, tangent, followed = k, along, True
         following = unit(x[vertex[k + 1]] - x[at])
         # Round a hollow corner the outline leads on; straight on lies the surface itself.
         corner = bool(following @ along < SMOOTH and following @ outward[at] < 0) and not old[k]
         turns_round = depth[at] > 0 and depth[vertex[k + 1]] < depth[at] and not old[k]
         if corner or turns_round or k == room:
             # From a corner the front goes on straight; an outline that turns round is left
-            # where it comes out of the body.
+            # where it is out of reach, or else where it comes out of the body.
             if corner or leaves < 0:
                 leaves, tangent = k, along
             break
