@@ -72,7 +72,10 @@ def test_stick_is_the_uncracked_body(order, traction):
 
 @ORDERS
 def test_stick_at_any_cut(order):
-    """Down to 1e-14 of a cell beside the nodes, on them, with mouths in sides that are imposed."""
+    """Down to 1e-14 of a cell beside the nodes, on them, with mouths in sides that are imposed.
+
+    A tip within 1e-7 of a cell is moved onto the mesh, and the faces are tilted by as much.
+    """
     mesh = xc.box((-1, -1), (1, 1), 10)
     ends = [(-0.53, 0.41), (-1.5, 0.41), (-1.5, 1.5), (-0.6, 0.4)]
     for k, share in enumerate([0.5, 1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 0.0]):
@@ -80,7 +83,8 @@ def test_stick_at_any_cut(order):
         crack = xc.line_crack([(a, 0.2 * share), (b, 0.2 * share)])
         for traction in (("left", "right"), ("bottom", "top"), ()):
             if traction or a > -1:
-                assert stick(mesh, crack, order, traction) <= STUCK, (share, traction)
+                tilt = share if share < 1e-7 else 0.0
+                assert stick(mesh, crack, order, traction) <= STUCK + tilt, (share, traction)
 
 
 # Slip ---------------------------------------------------------------------------------------------
@@ -394,10 +398,11 @@ def test_report_and_saved_solution(tmp_path):
     ]
 
 
-def test_no_bars_with_friction():
+def test_no_bars_with_friction_of_a_state_without_the_way_to_it():
     problem, states = rubbing.drawn(81, 14, 1)
-    solution = xc.solve(replace(problem, order=2), states, error=True)[0]
+    solution = xc.solve(replace(problem, order=2), [*states, *states], error=True)[-1]
     sif = xc.stress_intensity(solution, error=True)
+    assert solution.number > 0
     assert np.isnan(sif.bar).all()
     assert "friction" in sif.reasons[0]
 

@@ -390,7 +390,7 @@ def _short_parts(solution: Solution, crack: int) -> list[tuple[Floats, float, fl
         room = min([_room(mesh, j.x), *away[away > _SAME * size]])
         parts.append((j.x, float(room), _BRANCH, size))
     kinks = kinks_inside(solution, crack)
-    sizes = cell_sizes(mesh, kinks) if len(kinks) else []
+    sizes: Floats = cell_sizes(mesh, kinks) if len(kinks) else np.zeros(0)
     parts.extend(
         (x, _room(mesh, x), _KINK_ROOM, float(size)) for x, size in zip(kinks, sizes, strict=True)
     )
@@ -633,31 +633,33 @@ def _of_tips(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     if solutions[0].factored is None:
         problem, states = solutions[0].problem, [s.state for s in solutions]
         solutions = solve_states(problem, states, error=True)
-    bars = tip_bars(solutions, sifs, crack)
-    if not any(has_help(reason) for each in bars for reason in each.reasons):
-        return bars
     places = _places_of_finer_cells(solutions)
-    if places is None:
-        return bars
-    return bars_by_finer_cells(solutions, sifs, bars, crack, places, tip_bars)
+    if places is not None:
+        bars = bars_by_finer_cells(solutions, sifs, crack, places, tip_bars)
+        if bars is not None:
+            return bars
+    return tip_bars(solutions, sifs, crack)
 
 
-_MARGIN = 1.2  # cells become smaller by more than what is asked for
-_FINEST = 16.0  # times, at most
+_MARGIN = 2.0  # cells become smaller by more than what is asked for
+_FINEST = 24.0  # times, at most
 
 
 def _places_of_finer_cells(solutions: Sequence[Solution]) -> Places | None:
     """Where cells are too large for bars of any crack; all faces where nothing is estimated.
 
-    None where a second solution is no help: at order 1, and with friction where states are missing
-    on the way to these.
+    None where they are small enough, or a second solution is no help: at order 1, for a contact
+    method, and with friction where states are missing on the way to these.
     """
     solution = solutions[0]
     space = solution.space
     if space.order == 1:
         return None
     cracks = range(len(space.cracks))
-    if any(_refusal_of_solution(solution, c) for c in cracks):
+    general = [reason for c in cracks if (reason := _refusal_of_solution(solution, c))]
+    if general and not all(has_help(reason) for reason in general):
+        return None
+    if general:
         rubs = any(c is not None and c.shear is not None for c in solution.contact)
         is_whole = [s.number for s in solutions] == list(range(len(solutions)))
         return along_faces(solution) if is_whole or not rubs else None

@@ -25,7 +25,7 @@ _GROWS = 0.3  # by which cells grow with the distance from where they are smalle
 _HALF = 0.5  # of a cell, where nothing is estimated
 # Of the change of both modes of K to the second solution: what is added, as squares are, where that
 # has a bar of its own; of the largest change of a crack, least half-width where it has none.
-_ADDED, _LEAST = 0.05, 0.5
+_ADDED, _LEAST = 0.03, 0.5
 # Reasons that smaller cells do not take away, and that the change of K does not show.
 _STAYS = (
     "order 1", "contact by", "the faces press at the kink",
@@ -92,73 +92,56 @@ def finer_solutions(solutions: Sequence[Solution], places: Places) -> list[Solut
 def bars_by_finer_cells(
     solutions: Sequence[Solution],
     sifs: Sequence[SIF],
-    bars: Sequence[KErrors],
     crack: int,
     places: Places,
     estimate: Bars,
-) -> list[KErrors]:
-    """Bars of one crack, where there were none from a second solution.
+) -> list[KErrors] | None:
+    """Bars of one crack from a second solution; None where that is refused, or has other tips.
+
+    All cracks of a scene take theirs from it, also those whose cells are small enough: what one
+    crack lacks is in K of its neighbours.
 
     Parameters
     ----------
     solutions : sequence of Solution
     sifs : sequence of SIF
         One for each.
-    bars : sequence of KErrors
-        Those of one solution, with reasons where there is none.
     crack : int
     places : Places
     estimate : callable
         Bars of the second solution by its factor.
-
-    Returns
-    -------
-    list of KErrors
-        As they were where the second solution is refused, or has other tips.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", XcrackWarning)  # those of the first solution count
         try:
             finer = finer_solutions(solutions, places)
         except XcrackError:
-            return list(bars)
+            return None
         tips = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
         by_tip = [intensity_at_tip(finer, t)[0] for t in tips]
     if len(tips) != len(sifs[0].K):
-        return list(bars)
+        return None
     second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer))]
     of_second = estimate(finer, second, crack)
-    every = zip(sifs, bars, second, of_second, strict=True)
-    return [_together(*one) for one in every]
+    every = zip(sifs, second, of_second, strict=True)
+    return [_from_second(*one) for one in every]
 
 
-def _together(sif: SIF, bars: KErrors, second: SIF, of_second: KErrors) -> KErrors:
-    """Bars of one state, from the second solution where the first has none."""
-    left = [r if r.startswith(_STAYS) else "" for r in bars.reasons]
-    left = [a or (b if b.startswith(_STAYS) else "") if r else "" for a, b, r in
-            zip(left, of_second.reasons, bars.reasons, strict=True)]  # fmt: skip
-    is_missing = np.array([bool(reason) for reason in bars.reasons], dtype=bool)
+def _from_second(sif: SIF, second: SIF, of_second: KErrors) -> KErrors:
+    """Bars of one state from the second solution."""
+    left = [reason if reason.startswith(_STAYS) else "" for reason in of_second.reasons]
     is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
     best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
     eta = best - sif.K
     eta[sif.closed, 0] = 0.0  # K_I of closed tips is zero
-    change = np.abs(eta)
     both = np.linalg.norm(eta, axis=1, keepdims=True)
-    half = np.maximum(change, _LEAST * both.max(initial=0.0))
+    half = np.maximum(np.abs(eta), _LEAST * both.max(initial=0.0))
     known = np.hypot(of_second.bar, _ADDED * both)
     bar = np.where(is_known[:, None], known, half)
     shut = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
     bar[sif.closed, 0] = shut[sif.closed]
     contact = np.zeros_like(bar) if of_second.contact is None else np.array(of_second.contact)
-    contact = np.where(is_known[:, None], contact, 0.0)
-    first = np.zeros_like(bar) if bars.contact is None else bars.contact
-    rows = is_missing[:, None]
-    return bars_of(
-        np.where(rows, eta, bars.eta),
-        np.where(rows, bar, bars.bar),
-        left,
-        np.where(rows, contact, first),
-    )
+    return bars_of(eta, bar, left, np.where(is_known[:, None], contact, 0.0))
 
 
 __all__: list[str] = []
