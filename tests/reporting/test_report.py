@@ -477,6 +477,7 @@ def test_load_history_is_drawn(tmp_path):
     part = text[text.index('id="spectrum"') : text.index('id="K"')]
     assert "20 numbers" in part
     assert "sha256" not in part
+    assert "R of the cycles of each flight is 0 to 0.667" in text  # of 0 to 1 and of .4 to .6
     assert "flights" in numbers["summary"]["life"]
     figure = xc.plot_spectrum(spectrum, file=tmp_path / "spectrum.png")
     assert "flight" in figure.axes[0].get_xlabel()
