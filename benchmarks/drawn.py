@@ -5,7 +5,8 @@
     python -m benchmarks.drawn --plane 0:1000 --space 0:100 # the first ones
     python -m benchmarks.drawn --plane 0:0 --space 0:0      # the page of what is stored
 
-Scenes are those of tests/support/drawn_cracks.py. Finished scenes are files in --folder: a run that
+Scenes are those of tests/support/drawn_cracks.py and, of cracks that meet in space,
+drawn_pairs.py. Finished scenes are files in --folder: a run that
 was stopped goes on. Short rows add up in benchmarks/results/drawn.json, and docs/drawn.md with its
 picture is written from them.
 """
@@ -29,24 +30,31 @@ sys.path.append(str(ROOT / "tests"))
 RESULTS = ROOT / "benchmarks" / "results" / "drawn.json"
 PAGE = ROOT / "docs" / "drawn.md"
 PICTURE = "drawn_worst.png"
-WANTED = {"plane": 8500, "space": 1500}
+WANTED = {"plane": 8500, "space": 1500, "pairs": 100, "growing": 30}
 SECONDS = 120.0  # a scene that takes longer is a fault
 OFF = 0.05  # share of the largest K from which on a scene is a bad one
 BLOCK = 50  # scenes between two writes of the results
 
 
 import xcrack as xc  # noqa: E402
-from support import drawn_cracks  # noqa: E402
+from support import drawn_cracks, drawn_pairs  # noqa: E402
 
 Row = dict[str, Any]
 Stored = dict[str, dict[str, Row]]
 
 _OURS = ("MeshError", "CoarseMeshError", "GeometryError", "ProblemError", "ConvergenceError")
+MEETING = ("pairs", "growing")  # without bars and without a truth
+OUTCOME = {
+    "plane": drawn_cracks.outcome,
+    "space": drawn_cracks.outcome,
+    "pairs": drawn_pairs.outcome,
+    "growing": drawn_pairs.outcome,
+}
 _NUMBERS = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 _KEPT = (
     "kind", "places", "K is nan", "bars", "bars that are nan", "nan without a reason",
     "closed places", "truth", "bars judged", "bars held", "too wide", "worst over bar",
-    "error of K",
+    "error of K", "added", "unbalanced",
 )  # fmt: skip
 
 
@@ -60,7 +68,7 @@ def run(where: str, seeds: range, folder: Path, workers: int, path: Path) -> Non
         cases = [{"seed": seed, "where": where} for seed in block]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", xc.XcrackWarning)  # counts of failures: in the table
-            study = xc.campaign(drawn_cracks.outcome, cases, path=folder / where, workers=workers)
+            study = xc.campaign(OUTCOME[where], cases, path=folder / where, workers=workers)
         for row in study.rows:
             stored[where][str(row["parameters"]["seed"])] = short(row)
         write(path, stored)
@@ -91,7 +99,8 @@ def general(words: str) -> str:
 
 def read(path: Path) -> Stored:
     """Stored rows by where, and by seed."""
-    return json.loads(path.read_text()) if path.exists() else {where: {} for where in WANTED}
+    stored = json.loads(path.read_text()) if path.exists() else {}
+    return {where: stored.get(where, {}) for where in WANTED}
 
 
 def write(path: Path, stored: Stored) -> None:
@@ -180,6 +189,8 @@ def warned(stored: Stored) -> str:
     """How often warnings fire where K is off, and where it is not."""
     table = []
     for where, rows_of in stored.items():
+        if where in MEETING:
+            continue
         known = [row for row in rows_of.values() if row.get("truth") == "found"]
         known = [row for row in known if "error of K" in row]
         bad = [row for row in known if row["error of K"] > OFF]
@@ -197,6 +208,8 @@ def bars(stored: Stored) -> str:
     table = []
     for where, rows_of in stored.items():
         solved = [row for row in rows_of.values() if "raised" not in row]
+        if where in MEETING:
+            continue
         for name, rows in {**groups_of(solved), "all": solved}.items():
             judged = total(rows, "bars judged")
             table.append((
@@ -206,6 +219,21 @@ def bars(stored: Stored) -> str:
             ))  # fmt: skip
     head = ("where", "drawn", "solved", "bar holds", "more than ten times too wide", "no bar")
     return lines_of(head, table)
+
+
+def meetings(stored: Stored) -> str:
+    """What became of pairs that may meet, and of those that grow."""
+    table = []
+    for where in ("pairs", "growing"):
+        rows = stored.get(where, {}).values()
+        words = [row["kind"] if "raised" not in row else f"refused: {row['words']}" for row in rows]
+        for kind, count in Counter(words).most_common():
+            off = [r["unbalanced"] for r in rows if r.get("kind") == kind and "unbalanced" in r]
+            table.append((
+                where, kind.replace("|", "/"), count,
+                f"{100 * max(off):.1f} %" if off else "–",
+            ))  # fmt: skip
+    return lines_of(("drawn", "came to", "scenes", "energy not explained, largest"), table)
 
 
 def worst(stored: Stored, n: int = 10) -> list[tuple[str, int, Row]]:
@@ -218,7 +246,7 @@ def worst(stored: Stored, n: int = 10) -> list[tuple[str, int, Row]]:
 def page(stored: Stored) -> str:
     """The page as text."""
     drawn = {where: len(rows) for where, rows in stored.items()}
-    complete = all(drawn[where] >= WANTED[where] for where in WANTED)
+    complete = all(drawn[where] >= WANTED[where] for where in ("plane", "space"))
     first = "All" if complete else "The first"
     faults = [
         (w, seed, row.get("words", "nan")) for w, rows in stored.items()
@@ -235,6 +263,7 @@ def page(stored: Stored) -> str:
         faults=fault_lines, refused=counted(stored, "words", "refused because"),
         messages=counted(stored, "messages", "warning"), warned=warned(stored), bars=bars(stored),
         reasons=counted(stored, "reasons", "why there is no bar"), picture=PICTURE,
+        meetings=meetings(stored),
         worst=lines_of(("scene", "drawn", "error over bar", "error of K over the largest"), ten),
     )  # fmt: skip
 
@@ -278,6 +307,17 @@ fewer that are ten times too wide are not to be expected.
 {bars}
 
 {reasons}
+
+## Cracks that meet in space
+
+Pairs of pennies and ellipses at any offset and angle in a pulled cube, at order 1, ten cells
+across (`tests/support/drawn_pairs.py`). Of two that cross one runs through and the other is two
+arms; where one is cut by the front of the other the two are interlocked, which is refused. Where
+a message asks for a finer mesh at a place, or to leave an arm out, that is done, down to cells of
+.06. Growing pairs begin apart and go on for a step after they have met; what of the energy of a
+step the release over the new area does not explain is a share of all of it.
+
+{meetings}
 
 ## The worst ten
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack.junctions_3d import body_of
+from support import meeting_energy
 from xcrack.crack.measures import front_length_inside
-from xcrack.mesh.locate import Body
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")]
 
@@ -40,46 +39,8 @@ def grow(problem, law=LAW, cycle=CYCLE, **options):
     return xc.grow(problem, law, xc.max_hoop_stress, cycle, **given | options)
 
 
-def areas(step):
-    """Of the faces of each crack that count."""
-    result = []
-    body = Body.of(step.solutions[-1].problem.mesh)
-    for c in range(len(step.cracks)):
-        side, total = body_of(step.cracks, c, body), 0.0
-        for corner in step.cracks[c].points[step.cracks[c].faces]:
-            t = (np.arange(12) + 0.5) / 12
-            u, v = (a.ravel() for a in np.meshgrid(t, t))
-            u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-            x = (
-                corner[0]
-                + u[:, None] * (corner[1] - corner[0])
-                + v[:, None] * (corner[2] - corner[0])
-            )
-            area = np.linalg.norm(np.cross(corner[1] - corner[0], corner[2] - corner[0])) / 2
-            total += area * float(side.contains(x).mean())
-        result.append(total)
-    return np.array(result)
-
-
-def release(step):
-    """Mean energy release rate of each crack."""
-    K = [sif.K for sif in step.sif[-1]]
-    return np.array(
-        [
-            ((k[:, :2] ** 2).sum(axis=1) * (1 - NU**2) + k[:, 2] ** 2 * (1 + NU)).mean() / E
-            for k in K
-        ]
-    )
-
-
 def unbalanced(history):
-    """What of the energy of each step after the first no release over the new area explains."""
-    result = []
-    for one, other in zip(history.steps, history.steps[1:]):
-        released = 0.5 * (release(one) + release(other)) @ (areas(other) - areas(one))
-        energy = other.solutions[-1].energy
-        result.append((energy - one.solutions[-1].energy - released) / energy)
-    return np.array(result)
+    return meeting_energy.unbalanced(history.steps, E, NU)
 
 
 @pytest.mark.mission

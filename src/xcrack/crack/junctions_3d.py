@@ -11,8 +11,8 @@ from typing import Annotated
 import numpy as np
 
 from xcrack.base.arguments import Part, Whole, check_arguments
-from xcrack.base.arrays import Bools, Floats, Ints, at
-from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack.base.arrays import Bools, Floats
+from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import Front, front_frames
@@ -22,8 +22,6 @@ from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.triangulation import sides
 
-_BEYOND = 2.0  # legs of cells by which fronts are kept beyond the crack on which an arm ends
-_DRAWN = 1.2  # legs of cells by which an arm must be drawn on beyond it at least
 _LED = 2.2  # cells beyond it, to which a front that comes to its face is led
 _LEG = 3**-0.5  # leg of a cell over its longest edge
 
@@ -39,7 +37,7 @@ def arm(
     Parameters
     ----------
     crack : Crack
-        Drawn on beyond the other crack, by two cells or more.
+        Drawn to the other one or through it; what lies beyond does not count.
     on : int
         Number of the other one in `Problem.cracks`. It runs through: where they meet it must reach
         at least a cell beyond the arm.
@@ -165,27 +163,7 @@ def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, agrees: bool) -> li
     return result
 
 
-def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
-    """Placed cracks, the fronts of arms cut down to the side on which they lie.
-
-    Raises
-    ------
-    GeometryError
-        An arm on a crack that is not there, in a circle, or that lies on one side of it.
-    CoarseMeshError
-        An arm that is not drawn on far enough.
-    """
-    if not any(crack.ends_on for crack in given):
-        return cracks
-    _check_numbers(given)
-    result = [replace(own, ends_on=one.ends_on) for one, own in zip(given, cracks, strict=True)]
-    for c, crack in enumerate(given):
-        if crack.ends_on and crack.fronts is None:
-            result[c] = _cut_down(result, c, Body.of(mesh))
-    return tuple(result)
-
-
-def _check_numbers(given: Sequence[Crack]) -> None:
+def check_numbers(given: Sequence[Crack]) -> None:
     """Raise where arms end on what is not there, on themselves, or in a circle."""
     for c, crack in enumerate(given):
         beneath, number = [c], c
@@ -210,73 +188,6 @@ def _check_numbers(given: Sequence[Crack]) -> None:
             raise GeometryError(
                 f"crack {c} ends on one crack twice: give an arm for each side of it."
             )
-
-
-def _cut_down(cracks: Sequence[Crack], c: int, body: Body) -> Crack:
-    crack = cracks[c]
-    for on, side in crack.ends_on:
-        depth = side * _signed(cracks[on], crack.points)
-        inside = body.contains(crack.points)
-        if not (depth < 0).any():
-            x = crack.points[int(np.argmin(np.where(inside, depth, depth.max())))]
-            raise GeometryError(
-                f"crack {c} does not reach crack {on}, on which it is to end: it stops "
-                f"{depth.min():.4g} before it, as at {at(x)}. Draw it on through that crack by two "
-                f"cells or more (what lies beyond does not count), or take the other side of it."
-            )
-        if not (depth > 0).any():
-            raise GeometryError(
-                f"crack {c} lies wholly beyond crack {on}, on which it is to end from side "
-                f"{side:+d}: take side {-side}."
-            )
-    fronts: list[Ints] = []
-    for front in crack.fronts or ():
-        fronts.extend(_parts_before(cracks, c, front, body))
-    return replace(crack, fronts=tuple(fronts))
-
-
-def _parts_before(cracks: Sequence[Crack], c: int, front: Ints, body: Body) -> list[Ints]:
-    """Parts of a front on the side that counts, each with two cells beyond."""
-    closed = bool(front[0] == front[-1])
-    loop = np.array(front[:-1] if closed else front)
-    x = cracks[c].points[loop]
-    depth = distance_to_side(cracks, c, x)
-    if (depth > 0).all():
-        return [front]
-    leg = _LEG * body.cell_size(x)
-    keep = depth > 0
-    if closed:  # begin at the place farthest beyond
-        k = int(np.argmin(depth))
-        loop, x = np.roll(loop, -k), np.roll(x, -k, axis=0)
-        depth, leg, keep = np.roll(depth, -k), np.roll(leg, -k), np.roll(keep, -k)
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
-    ends = np.flatnonzero(np.diff(np.r_[0, keep.astype(int), 0]))
-    parts: list[Ints] = []
-    counted = np.zeros(len(loop), dtype=bool)
-    last_stop = -1
-    for first, stop in zip(ends[::2], ends[1::2], strict=True):
-        reach = _BEYOND * float(leg[first:stop].mean())
-        low = max(int(np.searchsorted(s, s[first] - reach)), last_stop)
-        high = int(np.searchsorted(s, s[stop - 1] + reach, side="right"))
-        low, high = max(min(low, first - 1), 0), min(max(high, stop + 1), len(loop))
-        counted[low:high] = True
-        if parts and low <= last_stop:
-            parts[-1] = np.concatenate([parts[-1], loop[last_stop:high]])
-        else:
-            parts.append(np.array(loop[low:high]))
-        last_stop = high
-    if closed:
-        counted[0] = False
-    rest = ~counted & body.contains(x) & (depth > -_DRAWN * leg)
-    if rest.any():
-        k = int(np.argmax(np.where(rest, depth, -np.inf)))
-        others = " and ".join(str(on) for on, _ in cracks[c].ends_on)
-        raise CoarseMeshError(
-            f"crack {c} runs only {-depth[k]:.4g} beyond crack {others}, on which it ends, at "
-            f"{at(x[k])}: draw it on by two cells ({2 * leg[k]:.4g}) or more (what lies beyond "
-            "does not count), or refine the mesh there."
-        )
-    return parts
 
 
 def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
@@ -436,8 +347,8 @@ __all__ = [
     "FaceAhead",
     "are_opposite",
     "arm",
-    "arms_placed",
     "body_of",
+    "check_numbers",
     "crossings",
     "distance_to_side",
     "face_ahead",

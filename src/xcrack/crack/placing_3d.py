@@ -18,9 +18,16 @@ from xcrack.crack.boundary_trace import (
     runs_of,
 )
 from xcrack.crack.crack import Crack
-from xcrack.crack.junctions_3d import are_opposite, body_of, crossings, is_before, may_touch
+from xcrack.crack.junctions_3d import (
+    are_opposite,
+    body_of,
+    check_numbers,
+    crossings,
+    is_before,
+    may_touch,
+)
 from xcrack.crack.merging import joined_fronts
-from xcrack.mesh.distances import closest_in, triangle_tree
+from xcrack.mesh.distances import closest_in, signed_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import cross, is_within
@@ -214,6 +221,7 @@ _MOUTH = 0.5  # an edge within this share of a cell from the boundary is a mouth
 _LOST = 0.4  # of a cell: a shorter rest of a front has left the body
 _SEEN = 0.05  # share of a cell inside the boundary from which on an outline ends in the body
 _NEAR = 3.0  # cells around the body in which the outline is refined
+_BEFORE_FRONT = 0.5  # of a cell: an arm ends no closer to the front of the crack on which it ends
 _TOUCH = 1e-6  # share of a cell within which cracks touch
 
 
@@ -324,6 +332,74 @@ def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:
     crack = cracks[c]
     placed = _placed_crack(crack, body_of(cracks, c, Body.of(mesh)))[0]
     return replace(placed, ends_on=crack.ends_on)
+
+
+def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+    """Placed cracks, the arms among them placed before the cracks on which they end.
+
+    Parameters
+    ----------
+    given : sequence of Crack
+        Arms whose fronts are known keep them.
+    cracks : tuple of Crack
+        The same ones, placed in the mesh.
+    mesh : Mesh
+
+    Raises
+    ------
+    GeometryError
+        An arm on a crack that is not there, in a circle, or that lies on one side of it.
+    CoarseMeshError
+        An arm without a front that is as long as a cell.
+    """
+    if not any(crack.ends_on for crack in given):
+        return cracks
+    check_numbers(given)
+    result = [replace(own, ends_on=one.ends_on) for one, own in zip(given, cracks, strict=True)]
+    for c, crack in enumerate(given):
+        if crack.ends_on and crack.fronts is None:
+            small = _check_reach(result, c, Body.of(mesh))
+            try:
+                placed, short = _placed_crack(crack, body_of(result, c, Body.of(mesh)))
+            except CoarseMeshError as error:
+                raise CoarseMeshError(small) from error
+            if short and not placed.fronts:
+                raise CoarseMeshError(small)
+            result[c] = replace(placed, ends_on=crack.ends_on)
+    return tuple(result)
+
+
+def _check_reach(cracks: Sequence[Crack], c: int, body: Body) -> str:
+    """Raise where an arm does not reach a crack on which it ends.
+
+    Else what to say where it hardly comes off it.
+    """
+    x = cracks[c].points
+    x = x[body.contains(x)]
+    size = body.cell_size(x)
+    off = np.full(len(x), np.inf)
+    for on, side in cracks[c].ends_on:
+        depth = side * signed_in(triangle_tree(cracks[on].points, cracks[on].faces), x)[0]
+        if not len(x) or (depth < 0).all():
+            raise GeometryError(
+                f"crack {c} lies wholly beyond crack {on}, on which it is to end from side "
+                f"{side:+d}: take side {-side}."
+            )
+        k = int(np.argmin(depth))
+        if depth[k] > _TOUCH * size[k]:
+            raise GeometryError(
+                f"crack {c} does not reach crack {on}, on which it is to end: it stops "
+                f"{depth[k]:.4g} before it, as at {at(x[k])}. Draw it on to that crack or through "
+                "it (what lies beyond does not count), or take the other side of it."
+            )
+        off = np.minimum(off, depth)
+    k = int(np.argmax(off))
+    names = " and ".join(f"{on} from side {side:+d}" for on, side in cracks[c].ends_on)
+    return (
+        f"crack {c} ends on crack {names}, but comes only {off[k]:.4g} off it, as at {at(x[k])}: "
+        f"on that side no front is left as long as a cell ({size[k]:.4g}). Leave this arm out, or "
+        "refine the mesh there."
+    )
 
 
 def place_arms(cracks: Sequence[Crack], mesh: Mesh) -> list[Crack]:
@@ -490,7 +566,7 @@ def _front_sides(x: Floats, candidate: Bools, body: Body) -> tuple[Bools, list[S
                 place = tuple(((x + following) / 2)[run].mean(axis=0).tolist())
                 short.append(ShortFront(place, float(length[run].sum()), float(size[run].max())))
                 inside[run] = False
-            elif (candidate[run] & (depth[run] < 0)).all():
+            elif (candidate[run] & (depth[run] < -_TOUCH * size[run])).all():
                 inside[run] = True
     return inside, short
 
@@ -560,9 +636,9 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
         apart = [not are_opposite(cracks[a], cracks[b]) for a, b in owner[pairs].tolist()]
         pairs = pairs[np.array(apart, dtype=bool)]
     distance = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
-    close_pairs = np.nonzero(
-        (distance < size[pairs].min(axis=1)) | (cell[pairs[:, 0]] == cell[pairs[:, 1]])
-    )[0]
+    meets = np.array([may_touch(cracks, a, b) for a, b in owner[pairs].tolist()], dtype=bool)
+    least = size[pairs].min(axis=1) * np.where(meets, _BEFORE_FRONT, 1.0)
+    close_pairs = np.nonzero((distance < least) | (cell[pairs[:, 0]] == cell[pairs[:, 1]]))[0]
     if len(close_pairs):
         k = close_pairs[np.argmin(distance[close_pairs])]
         i, j = pairs[k]
@@ -570,6 +646,14 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
             raise GeometryError(
                 f"the fronts of cracks {owner[i]} and {owner[j]} share the point {at(x[i])}, where "
                 "no mesh can part them: leave a few cells between, or join them to one surface."
+            )
+        if meets[k]:
+            arm, on = owner[[i, j]] if cracks[owner[i]].ends_on else owner[[j, i]]
+            raise CoarseMeshError(
+                f"crack {arm} comes to within {distance[k]:.4g} of the front of crack {on}, on "
+                f"which it ends, at {at(x[i])}, closer than half a cell ({size[i] / 2:.4g}): "
+                f"refine the mesh there, let crack {on} reach farther beyond crack {arm}, or end "
+                "it a few cells before."
             )
         raise CoarseMeshError(
             f"the front of crack {owner[i]} at {at(x[i])} and that of crack "

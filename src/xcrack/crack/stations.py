@@ -13,9 +13,9 @@ from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.front_curve import front_curve
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.junctions import Junction
-from xcrack.crack.junctions_3d import arms_placed, is_before, surface_junctions
+from xcrack.crack.junctions_3d import is_before, surface_junctions
 from xcrack.crack.placing_2d import check_lines, place_line, vertices_on_mesh
-from xcrack.crack.placing_3d import ShortFront, check_surfaces, place_surface
+from xcrack.crack.placing_3d import ShortFront, arms_placed, check_surfaces, place_surface
 from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
 from xcrack.mesh.locate import contains
 from xcrack.mesh.mesh import Mesh

@@ -74,8 +74,8 @@ def _check(
         if (_on_faces(mesh, ending) & _on_faces(mesh, through)).any():
             return  # both lie on facets of the mesh, and meet on edges of it
         raise GeometryError(
-            f"crack {c} does not reach crack {on}, on which it is to end: draw it on through that "
-            "crack by two cells or more, or take the other side of it."
+            f"crack {c} does not reach crack {on}, on which it is to end: draw it on to that "
+            "crack or through it, or take the other side of it."
         )
     past = acts & (through.side == 0) & ~through.is_cut
     if past.any():
@@ -84,7 +84,8 @@ def _check(
             f"crack {c} ends on crack {on}, but runs past its front, or to within a cell of it, at "
             f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}: let crack {on} reach two cells or "
             f"more beyond crack {c}, refine the mesh there, or let crack {c} run through and crack "
-            f"{on} end on it, an arm for each side on which it lies."
+            f"{on} end on it, an arm for each side on which it lies. Where each runs past the "
+            "front of the other neither helps: end one of them a few cells before."
         )
     cells = np.nonzero(met)[0]
     one, other = (_slopes(mesh, cut, cells) for cut in (through, ending))

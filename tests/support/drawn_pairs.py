@@ -1,0 +1,223 @@
+"""Drawn pairs of pennies and ellipses in space: solved, or refused in words; a seed is a scene.
+
+Pairs stand at any offset and angle in a cube that is pulled alike from all sides. The line in
+which their planes meet tells what they are: apart; one cut through by the other, which are given
+as one and two arms; or interlocked, each front through the face of the other. No solution is
+foreign: the cracks release at least what the largest penny in one of them would in an infinite
+body, to a tenth, and no K is infinite or not a number. Where the mesh is too
+coarse it is refined around the place that the message names, as that asks for. Pairs that grow
+begin apart.
+"""
+
+import json
+import re
+import time
+import warnings
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+import xcrack as xc
+from support.meeting_energy import unbalanced
+from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack.mesh.locate import Body
+
+E, NU, PULL = 1e5, 0.3, 100.0
+CELLS = 10  # across the cube of side 2
+FINEST = 0.06  # longest edge of cells to which meshes are refined where a message asks for it
+GROWING_CELLS = 13  # across the cube of side 2.5
+DA, MOST_STEPS = 0.12, 6
+SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
+LOADS = [
+    xc.traction(name, sign * PULL * np.eye(3)[axis])
+    for axis, names in enumerate(SIDES)
+    for name, sign in zip(names, (-1, 1), strict=True)
+]
+
+
+class ForeignEnergyError(Exception):
+    """The cracks release less than one of them would alone: a fault, not a refusal."""
+
+
+def drawn_crack(rng, centre, least, most):
+    """A penny or an ellipse, with the radius of the largest penny in it."""
+    normal = rng.normal(size=3)
+    radius = rng.uniform(least, most)
+    if rng.uniform() < 0.5:
+        return xc.penny_crack(centre, normal, radius), radius
+    along, share = np.cross(normal, rng.normal(size=3)), rng.uniform(0.6, 1.0)
+    return xc.elliptic_crack(centre, normal, along, radius, radius * share), radius * share
+
+
+def pair(seed):
+    """Two cracks, and the radius of the largest penny in either."""
+    rng = np.random.default_rng(seed)
+    centre, way = rng.uniform(-0.1, 0.1, 3), rng.normal(size=3)
+    way *= rng.uniform(0.0, 0.6) / np.linalg.norm(way)
+    one, r = drawn_crack(rng, centre - way / 2, 0.45, 0.7)
+    other, s = drawn_crack(rng, centre + way / 2, 0.3, 0.4)
+    return [one, other], max(r, s)
+
+
+def pair_to_grow(seed):
+    """Two cracks with one to three quarters of an advance between them."""
+    rng = np.random.default_rng([77, seed])
+    way = rng.normal(size=3)
+    way /= np.linalg.norm(way)
+    one, _ = drawn_crack(rng, np.zeros(3), 0.3, 0.42)
+    other, _ = drawn_crack(rng, np.zeros(3), 0.25, 0.38)
+    wanted = rng.uniform(1.8, 2.6) * 2.5 / GROWING_CELLS
+    low, high = 0.0, 1.2
+    for _ in range(30):
+        away = (low + high) / 2
+        gap = cKDTree(one.points).query(other.points + away * way)[0].min()
+        low, high = (away, high) if gap < wanted else (low, away)
+    shift = np.array([-0.5, 0.5])[:, None] * high * way
+    surfaces = [xc.surface_crack(c.points + d, c.faces) for c, d in zip((one, other), shift)]
+    return surfaces
+
+
+def normal_of(crack):
+    a, b, c = crack.points[crack.faces[0]]
+    return np.cross(b - a, c - a)
+
+
+def reach(crack, other, along):
+    """From where to where a plane crack crosses the plane of another one; None: it does not."""
+    height = (crack.points - other.points[0]) @ normal_of(other)
+    pairs = np.concatenate([crack.faces[:, [0, 1]], crack.faces[:, [1, 2]], crack.faces[:, [2, 0]]])
+    a, b = height[pairs].T
+    crossed = (a * b <= 0) & (a != b)
+    if not crossed.any():
+        return None
+    t = a[crossed] / (a - b)[crossed]
+    start, stop = crack.points[pairs[crossed]].transpose(1, 0, 2)
+    s = (start + t[:, None] * (stop - start)) @ along
+    return float(s.min()), float(s.max())
+
+
+def kind_of(one, other):
+    """ "apart", "cut through" (the second by the first), "cuts through" or "interlocked"."""
+    along = np.cross(normal_of(one), normal_of(other))
+    a, b = reach(one, other, along), reach(other, one, along)
+    if a is None or b is None or a[1] < b[0] or b[1] < a[0]:
+        return "apart"
+    if a[0] < b[0] and b[1] < a[1]:
+        return "cut through"
+    return "cuts through" if b[0] < a[0] and a[1] < b[1] else "interlocked"
+
+
+def given_as(kind, one, other):
+    """The cracks as a user gives them: of two that cross one runs through."""
+    if kind == "apart":
+        return [one, other]
+    through, ending = (other, one) if kind == "cuts through" else (one, other)
+    return [through, xc.arm(ending, 0, 1), xc.arm(ending, 0, -1)]
+
+
+def solved(cracks, mesh):
+    """Solution and K of a pair."""
+    problem = xc.Problem(mesh, xc.Isotropic(E, NU), cracks, loads=LOADS, order=1, contact="off")
+    solution = xc.solve(problem)
+    return solution, [xc.stress_intensity(solution, c).K for c in range(len(cracks))]
+
+
+def refined_there(mesh, message):
+    """A mesh with cells half as large around the first place of a message; None: small enough."""
+    place = np.array(json.loads(re.search(r"\[[^]]*\]", message)[0]))
+    size = float(Body.of(mesh).cell_size(place[None])[0])
+    if size / 2 < FINEST / 2:
+        return None
+    near = 2.0 * size
+    return xc.refine(
+        mesh,
+        size=lambda x: np.where(np.linalg.norm(x - place, axis=1) < near, size / 2, np.inf),
+    )
+
+
+def solved_as_told(cracks):
+    """Solution and K, or a refusal, after the remedies of messages; and which those were."""
+    mesh, done = xc.box((-1,) * 3, (1,) * 3, CELLS), []
+    while True:
+        try:
+            return (*solved(cracks, mesh), done)
+        except (CoarseMeshError, GeometryError) as error:
+            words = str(error)
+            if "refine" not in words:
+                raise
+            if "Leave this arm out" in words and len(cracks) == 3:
+                cracks = [crack for c, crack in enumerate(cracks) if c != int(words.split()[1])]
+                done.append("without an arm that is no cell high")
+                continue
+            finer = refined_there(mesh, words)
+            if finer is None:
+                raise
+            mesh, done = finer, [each for each in done if each != "refined"] + ["refined"]
+
+
+def pair_row(seed):
+    """The row of a pair; what is refused in words, or raised by others, raises."""
+    begin = time.process_time()
+    (one, other), radius = pair(seed)
+    kind = kind_of(one, other)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution, K, done = solved_as_told(given_as(kind, one, other))
+    messages = sorted({str(w.message).split(":", 1)[-1] for w in caught})
+    plain = 0.5 * PULL**2 * 3 * (1 - 2 * NU) / E * 8
+    least = 8 * (1 - NU**2) * PULL**2 * radius**3 / (3 * E)
+    added = (solution.energy - plain) / least
+    if not added > 0.9:
+        raise ForeignEnergyError(f"{kind}: the cracks release {added:.3g} of a penny inside them")
+    return {
+        "kind": ", ".join([kind, *sorted(done)]),
+        "messages": json.dumps(messages),
+        "places": sum(map(len, K)),
+        "K is nan": int(sum((~np.isfinite(k)).sum() for k in K)),
+        "added": added,
+        "solve seconds": time.process_time() - begin,
+    }
+
+
+def growing_row(seed):
+    """The row of a pair that grows until it has met and one step more."""
+    begin = time.process_time()
+    cracks = pair_to_grow(seed)
+    mesh = xc.box((-1.25,) * 3, (1.25,) * 3, GROWING_CELLS)
+    problem = xc.Problem(mesh, xc.Isotropic(E, NU), cracks, loads=LOADS, order=1, contact="off")
+    steps, met, ended = [], None, ""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        run = xc.grow(
+            problem, xc.paris(C=1e-12, m=3.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=DA,
+            max_steps=MOST_STEPS, progress=False,
+        )  # fmt: skip
+        while met is None or len(steps) == met:
+            try:
+                steps.append(next(run))
+            except StopIteration as stop:
+                ended = str(stop.value or "")
+                break
+            if met is None and steps[-1].joins:
+                met = len(steps)
+    words = "met and gone on" if met is not None else "not met in six steps"
+    if ended:
+        words = f"met, then ended: {ended}" if met is not None else f"ended: {ended}"
+    off = unbalanced(steps, E, NU)
+    K = np.concatenate([sif.K.ravel() for step in steps for own in step.sif for sif in own])
+    return {
+        "kind": words,
+        "messages": json.dumps(sorted({str(w.message).split(":", 1)[-1] for w in caught})),
+        "places": len(K) // 3,
+        "K is nan": int((~np.isfinite(K)).sum()),
+        "unbalanced": float(np.abs(off).max(initial=0.0)),
+        "solve seconds": time.process_time() - begin,
+    }
+
+
+ROW = {"pairs": pair_row, "growing": growing_row}
+
+
+def outcome(seed, where):
+    """The row of a seed."""
+    return ROW[where](seed)

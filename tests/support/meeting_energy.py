@@ -1,0 +1,49 @@
+"""Energy of steps of growth in space against the release of their fronts over the new area."""
+
+import numpy as np
+
+from xcrack.crack.junctions_3d import body_of
+from xcrack.mesh.locate import Body
+
+SAMPLES = 12  # along each side of a face
+
+
+def areas(step):
+    """Of the faces of each crack that count."""
+    result = []
+    body = Body.of(step.solutions[-1].problem.mesh)
+    t = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    u, v = (a.ravel() for a in np.meshgrid(t, t))
+    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+    for c, crack in enumerate(step.cracks):
+        side, corner = body_of(step.cracks, c, body), crack.points[crack.faces]
+        one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+        x = corner[:, None, 0] + u[:, None] * one[:, None] + v[:, None] * other[:, None]
+        share = side.contains(x.reshape(-1, 3)).reshape(len(corner), -1).mean(axis=1)
+        result.append(float(share @ np.linalg.norm(np.cross(one, other), axis=1)) / 2)
+    return np.array(result)
+
+
+def release(step, E, nu):
+    """Mean energy release rate of each crack."""
+    K = [sif.K for sif in step.sif[-1]]
+    return np.array(
+        [
+            ((k[:, :2] ** 2).sum(axis=1) * (1 - nu**2) + k[:, 2] ** 2 * (1 + nu)).mean() / E
+            for k in K
+        ]
+    )
+
+
+def unbalanced(steps, E, nu):
+    """What of the energy of each step after the first no release over the new area explains."""
+    result = []
+    for one, other in zip(steps, steps[1:]):
+        rates, sizes = [release(step, E, nu) for step in (one, other)], [areas(one), areas(other)]
+        if len(rates[0]) != len(rates[1]):  # some have become one
+            rates = [np.array([g @ a / a.sum()]) for g, a in zip(rates, sizes, strict=True)]
+            sizes = [a.sum(keepdims=True) for a in sizes]
+        released = 0.5 * (rates[0] + rates[1]) @ (sizes[1] - sizes[0])
+        energy = other.solutions[-1].energy
+        result.append((energy - one.solutions[-1].energy - released) / energy)
+    return np.array(result)
