@@ -12,11 +12,12 @@ import numpy as np
 from xcrack.adaptivity.indicators import Indicators, indicators_of
 from xcrack.base.arrays import Floats
 from xcrack.base.errors import ProblemError, XcrackError, collected_warnings, warn
+from xcrack.fatigue.cycle import Cycle
 from xcrack.growth import sizes_2d, sizes_3d
 from xcrack.growth.corridor import corridor, ways_of
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.scout import Stage, samples, scouted
-from xcrack.growth.step import Step, run_state
+from xcrack.growth.step import Step, plan_of, run_state
 from xcrack.growth.step_length import PATH, REJECTED, next_length
 from xcrack.growth.uncertainty import TOGETHER
 from xcrack.mesh.locate import cell_sizes
@@ -309,6 +310,36 @@ def _outgrown(rule: GrowthRule, last: Step | None, step: Step) -> bool:
     )
 
 
+_FIRST, _MEASURED = 3, 4  # solves with bars of their own: the first ones, and each of so many
+_MARGIN = 0.5  # of what K may take of a tolerance: bars that are foretold may be wrong
+_STRAIGHT = 0.2  # rad, most that a path turns by on the way to a solve with foretold bars
+
+
+def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
+    """Whether the bars of K at the next solve may follow from those of the last one.
+
+    In 2D under a cycle, between solves that have their own: where these leave a margin, the mesh
+    stays, and the path is smooth. It follows from what is stored with the step: a run that is
+    resumed does the same.
+    """
+    error, index = last.error, last.index + 1
+    if not rule.estimates or error is None or rule.problem.mesh.dim == 3:
+        return False
+    if index < _FIRST or index % _MEASURED == 0 or run_state(last).meshes != rule.meshes:
+        return False
+    if not isinstance(rule.cycle, Cycle) or rule.load_program is not None or last.joins:
+        return False
+    plan = plan_of(last)
+    if plan.joins or any(crack.ends_on for crack in plan.cracks):
+        return False
+    largest = max((float(np.abs(angle).max(initial=0.0)) for angle in last.angle), default=0.0)
+    if largest > _STRAIGHT or not np.isfinite(error.rate):
+        return False
+    wanted = _MARGIN * float(rule.tolerance or 0.0)
+    rate, turn = _local(rule, last)
+    return rate <= SHARE * wanted and turn <= (1 - PATH) * wanted
+
+
 def _local(rule: GrowthRule, step: Step) -> tuple[float, float]:
     """Errors of rate and direction at a step by K, as they count for life and path."""
     error = step.error
@@ -337,4 +368,4 @@ def _with_room(rule: GrowthRule, other: GrowthRule, last: Step, step: Step) -> S
     return replace(last, control=replace(control, length=length, least=least))
 
 
-__all__ = ["SHARE", "finer", "fingerprint", "on", "prepared", "replanned"]
+__all__ = ["SHARE", "bars_are_foretold", "finer", "fingerprint", "on", "prepared", "replanned"]

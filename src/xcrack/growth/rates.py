@@ -66,7 +66,7 @@ class CriterionInput:
     K : (s, f, 2 or 3) array, stress √length
         Of the load states, or of both ends of each kind of cycle of a spectrum.
     rates_of_K : callable
-        K -> CycleRates.
+        K -> CycleRates; of a cycle several K side by side too, `(s, k f, 2 or 3)`.
     angle_of_K : callable
         K -> direction alone.
     """
@@ -269,10 +269,12 @@ def _inputs_of_cycle(
         names = materials[c]
 
         def rates_of_K(K: Floats) -> CycleRates:
-            angle, dK, R = evaluate_criterion(rule.criterion, K, nu, c, place)
+            times = K.shape[1] // max(len(a), 1)  # several K side by side at all stations
+            own_nu = np.tile(nu, times) if isinstance(nu, np.ndarray) else nu
+            angle, dK, R = evaluate_criterion(rule.criterion, K, own_nu, c, place)
             if free is not None:
                 dK, R = nominal_range(np.stack([state[c].K for state in free.sif]), angle, nu)
-            rate = evaluate_law(rule.law, dK, R, c, place, a, names)
+            rate = evaluate_law(rule.law, dK, R, c, place, np.tile(a, times), np.tile(names, times))
             return CycleRates(angle, dK, R, rate, np.stack([R, R], axis=1))
 
         def angle_of_K(K: Floats) -> Floats:

@@ -48,7 +48,7 @@ from xcrack.growth.levels import (
     states_and_levels,
 )
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
-from xcrack.growth.prepared import fingerprint, prepared, replanned
+from xcrack.growth.prepared import bars_are_foretold, fingerprint, prepared, replanned
 from xcrack.growth.progress import Progress, WarningLog
 from xcrack.growth.rates import check_choice, rates_of, warn_of_left_out
 from xcrack.growth.response import Response
@@ -62,7 +62,7 @@ from xcrack.growth.step import (
     run_state,
     solves_of,
 )
-from xcrack.growth.uncertainty import add_K_error, best_K, shortfall
+from xcrack.growth.uncertainty import add_K_error, best_K, foretold_bars, shortfall
 from xcrack.linalg.engine import SolverState
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
@@ -524,9 +524,24 @@ def _solved_step(
     reuse: SolverState,
     settings: Mapping[str, str],
     joins: Sequence[Join] = (),
+    may_foretell: bool = True,
 ) -> tuple[Step, SolverState]:
-    """Solve all load states of a problem and decide where and how fast its cracks grow."""
-    if rule.load_program is None:
+    """Solve all load states of a problem and decide where and how fast its cracks grow.
+
+    Where it may foretell the bars of K, they are those of the last solve, a little wider.
+    """
+    is_foretold = False
+    if may_foretell and last is not None and not joins and bars_are_foretold(rule, last):
+        if rule.max_steps is not None and last.index + 2 >= rule.max_steps:
+            # The last step has bars of its own; of a run that goes on it is one among others.
+            step, handed_on = _solved_step(rule, problem, last, reuse, settings, joins, False)
+            return _with_mark(step), handed_on
+        response = respond_to_states(rule, problem, reuse)
+        with_bars = foretold_bars(last.sif, response.sif)
+        if with_bars is None:
+            return _solved_step(rule, problem, last, response.reuse, settings, joins, False)
+        response, is_foretold = replace(response, sif=with_bars), True
+    elif rule.load_program is None:
         response = respond_to_states(rule, problem, reuse, rule.estimates)
     else:
         N = 0.0 if last is None else last.cycles + plan_of(last).cycles
@@ -554,7 +569,7 @@ def _solved_step(
             sif, solutions = response.sif, response.solutions
             rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
             corrected = correct(rule, last, rates, identities)
-    corrected = add_K_error(rule, last, corrected, rates, sif)
+    corrected = add_K_error(rule, last, corrected, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
     step = Step(
         index=index,
@@ -591,6 +606,9 @@ def _solved_step(
         ),
     )
     step = _with_plan(rule, step)
+    if is_foretold and (step.plan is None or step.plan.limit or end_of_run(rule, step)):
+        step, handed_on = _solved_step(rule, problem, last, handed_on, settings, joins, False)
+        return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
     return replace(step, da=rates.split(da)), handed_on
 
