@@ -386,7 +386,7 @@ def inspection(
         if not low <= a_detect < end:
             raise ProblemError(
                 f"inspection: a_detect = {a_detect:.6g} is no length of the run: give one "
-                f"from {low:.6g} to {end:.6g}."
+                f"from {low:.6g} to below {end:.6g}."
             )
         every = (last - curve.cycles_at(a_detect)) / factor
         first = begin + (last - begin) / 2

@@ -71,7 +71,7 @@ def plot_rates(
     length, K = (part.strip() for part in units.split(","))
     axes.set(xlabel=f"ΔK in {K}", ylabel=f"da/dN in {length} a cycle", title=f"R = {R:g}")
     for axis_format in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
-        axis_format(lambda x, _: f"{x:g}")
+        axis_format(lambda x, _: f"{x:g}" if f"{x:e}"[0] in "1235" else "")  # others would overlap
     axes.grid(True, which="both", alpha=0.25)
     axes.legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
     finish_figure(figure, target, target is None)

@@ -95,8 +95,9 @@ def _growth(source: Source) -> Rows:
     if history.settings:
         yield "growth law", _settings(history.settings, "law")
         yield "load history", _settings(history.settings, "cycle")
-    bar = history.life_bar.total
-    bars = "" if np.isnan(bar) else f" ± {bar:.2g} (numerical error)"
+    bar, by_steps = history.life_bar.total, history.life_bar.steps
+    bars = "" if np.isnan(by_steps) else f" ± {by_steps:.2g} (by the steps; K not estimated)"
+    bars = bars if np.isnan(bar) else f" ± {bar:.2g} (numerical error)"
     yield "life", f"{history.life:.6g} {history.unit}s{bars}"
     yield "why it ended", history.ended or "not known"
     for join in history.joins:
