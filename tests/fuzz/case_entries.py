@@ -19,6 +19,7 @@ from fuzz.kinds import (
     Word,
 )
 from fuzz.values import paths
+from xcrack.growth.options import GrowthOptions
 
 CASE = """
 title = "Edge crack"
@@ -132,6 +133,9 @@ def _reported(**named):
     return xc.report(**given | named)
 
 
+# `grow` has entries for what these are; here they only must not be taken for another thing.
+GROWTH = tuple(GrowthOptions.__annotations__)
+
 ENTRIES = [
     Entry(
         "read_case",
@@ -186,7 +190,7 @@ ENTRIES = [
             ),
             "problem": arg(Of(type=xc.Problem), Late(scenes.problem)),
             "states": arg(
-                Seen(rule=lambda v: v is None or (None if isinstance(v, list | tuple) else False)),
+                Seen(rule=lambda v: v is None or (None if isinstance(v, list | tuple) else SKIP)),
                 None,
                 [0.0, 1.0],
                 words=["states", "state"],
@@ -194,6 +198,11 @@ ENTRIES = [
             "title": arg(Word(), "a"),
             "until": arg(Seen(rule=lambda v: v is None), None),
             "tolerance": arg(Number(above=0, below=1, optional=True), None, 0.1),
+            **{
+                name: arg(Seen(rule=lambda v: v is None or SKIP), None)
+                for name in ("law", "criterion", "cycle", "da", *GROWTH)
+                if name != "tolerance"
+            },
         },
         in_folder=True,
         cost=0.1,

@@ -14,6 +14,8 @@ from typing import Annotated, Any, NoReturn, Unpack
 
 import numpy as np
 
+from xcrack.adaptivity.adapt import adapt
+from xcrack.analysis.solve import solve
 from xcrack.app import case_values as values
 from xcrack.app.case import METHODS, SOLVERS, read_case
 from xcrack.app.case_tables import FREE
@@ -109,9 +111,14 @@ def write_case(
     [0.5, 0.1]
     """
     file = path_of(path, "write_case: path", error=ProblemError, is_file=True)
+    if unknown := sorted(set(options) - set(GrowthOptions.__annotations__)):
+        raise TypeError(f"write_case() got an unexpected keyword argument {unknown[0]!r}")
     given = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, **options}
     given = {name: value for name, value in given.items() if value is not None}
     solving = {} if law else {name: given.pop(name) for name in _OF_SOLVE if name in given}
+    for name, value in solving.items():
+        maker = adapt if name in arguments_of(adapt) else solve
+        arguments_of(maker)[name].check(value, f"write_case: {name}")
     _check(given, states, until)
     writing = _Writing(file)
     tables: dict[str, Any] = {"mesh": {"kind": "file", "path": f"{file.stem}{_OF_MESH}"}}
