@@ -506,6 +506,8 @@ def _curved_points(lips: LipPoints, rows: Ints, place: Floats) -> Bools:
     """Which of some lip points lie where the faces turn, by their places in numbers of groups."""
     nx, ny = lips.normal[rows].T
     turn = np.unwrap(np.arctan2(ny, nx))
+    if not len(turn) or np.ptp(turn) <= _CURVED:  # straight faces need no look at each point
+        return np.zeros(len(turn), dtype=bool)
     first, last = np.searchsorted(place, place - 1), np.searchsorted(place, place + 1, "right")
     return np.array([np.ptp(turn[a:b]) > _CURVED for a, b in zip(first, last)], dtype=bool)
 
