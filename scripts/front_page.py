@@ -57,7 +57,7 @@ def _bar(figure: Any, image: Floats) -> None:
     """The bar of the example, with a colour bar in the font of the rest."""
     axis = figure.subplots()
     image = image[:, : image.shape[1] - BAR]
-    inked = (image[..., :3] < 0.99).any(axis=2)
+    inked = np.any(image[..., :3] < 0.99, axis=2)
     rows, columns = np.nonzero(inked.any(axis=1))[0], np.nonzero(inked.any(axis=0))[0]
     axis.imshow(image[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
     axis.axis("off")
