@@ -123,7 +123,16 @@ def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
             np.concatenate([part.at(shown[:, None])[..., 0] for part in parts]),
         )
 
-    names = ("touching", "apart", "skin", "outline", "cell_edges", "faint", "rims", "fronts")
+    names = (
+        "closed_faces",
+        "open_faces",
+        "skin",
+        "outline",
+        "cell_edges",
+        "faint_lines",
+        "rims",
+        "fronts",
+    )
     other_parts: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
     triangles, values = cut(picture.triangles, picture.values)
     return replace(picture, triangles=triangles, values=values, **other_parts)
