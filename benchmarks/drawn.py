@@ -226,9 +226,16 @@ def meetings(stored: Stored) -> str:
     table = []
     for where in ("pairs", "growing"):
         rows = stored.get(where, {}).values()
-        words = [row["kind"] if "raised" not in row else f"refused: {row['words']}" for row in rows]
+        words = [
+            general(row["kind"]) if "raised" not in row else f"refused: {row['words']}"
+            for row in rows
+        ]
         for kind, count in Counter(words).most_common():
-            off = [r["unbalanced"] for r in rows if r.get("kind") == kind and "unbalanced" in r]
+            off = [
+                r["unbalanced"]
+                for r in rows
+                if general(r.get("kind", "")) == kind and "unbalanced" in r
+            ]
             table.append((
                 where, kind.replace("|", "/"), count,
                 f"{100 * max(off):.1f} %" if off else "–",

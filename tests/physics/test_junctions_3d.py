@@ -334,7 +334,7 @@ BAD = {
     "touches along an edge": ([ONE, upright(0.017)], "let one of them end on the other"),
     "lies in it over an area": (
         [ONE, xc.penny_crack((0.013, 0.0, 0.017), (0, 0, 1), 0.35)],
-        "cross near|let one of them end",
+        "lie on each other near .* give both as one surface",
     ),
     "past its front": (
         [ONE, xc.arm(xc.penny_crack((0.5, 0.0, 0.017), (0, 1, 0), 0.35), 0, 1)],

@@ -35,12 +35,3 @@ def test_interlocked_pairs_are_refused_with_the_remedy():
     mesh = xc.box((-1,) * 3, (1,) * 3, 10)
     with pytest.raises(xc.XcrackError, match=r"end (one of them|it) a few cells before"):
         drawn_pairs.solved(drawn_pairs.given_as("interlocked", one, other), mesh)
-
-
-@pytest.mark.parametrize("seed", [2])
-def test_a_drawn_pair_grows_until_it_has_met(seed):
-    """Energy to 2 % through the meeting: order 1, and steps."""
-    row = drawn_pairs.growing_row(seed)
-    assert row["K is nan"] == 0
-    assert row["kind"].startswith("met")
-    assert row["unbalanced"] < 0.02

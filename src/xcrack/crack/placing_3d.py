@@ -222,6 +222,7 @@ _LOST = 0.4  # of a cell: a shorter rest of a front has left the body
 _SEEN = 0.05  # share of a cell inside the boundary from which on an outline ends in the body
 _NEAR = 3.0  # cells around the body in which the outline is refined
 _BEFORE_FRONT = 0.5  # of a cell: an arm ends no closer to the front of the crack on which it ends
+_FLUSH = np.cos(np.radians(5.0))  # between normals of cracks that lie on each other
 _TOUCH = 1e-6  # share of a cell within which cracks touch
 
 
@@ -606,12 +607,24 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
             meeting = meeting_points(cracks[i], crack, body)
             meeting = meeting[is_before(cracks, i, meeting) & is_before(cracks, j, meeting)]
             if len(meeting):
+                one, other = (_normal_at(each, meeting[:1]) for each in (cracks[i], crack))
+                if abs(float(one @ other)) > _FLUSH:
+                    raise GeometryError(
+                        f"cracks {i} and {j} lie on each other near {at(meeting[0])}: leave out "
+                        "what both share, or give both as one surface."
+                    )
                 raise GeometryError(
                     f"cracks {i} and {j} cross near {at(meeting[0])}: let one of them end on the "
                     f"other, arm(crack, on={i}, side=1), and where it goes on beyond give a second "
                     "arm with side=-1; or end it a few cells before."
                 )
     _check_apart(cracks, body)
+
+
+def _normal_at(crack: Crack, x: Floats) -> Floats:
+    """Unit normal of the face that is nearest to a point `(1, 3)`."""
+    face = closest_in(triangle_tree(crack.points, crack.faces), x).triangle
+    return np.asarray(face_normals(crack.points, crack.faces[face])[0])
 
 
 def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
