@@ -101,14 +101,29 @@ def test_a_crack_that_looks_the_other_way_is_turned():
 
 @pytest.mark.parametrize(
     ("height", "tilt", "good"),
-    [(0.0, 0.0, True), (0.15, 0.0, True), (0.25, 0.0, False), (0.0, 0.2, True), (0.0, 0.6, False)],
+    [
+        (0.0, 0.0, True),
+        (0.15, 0.0, True),
+        (0.25, 0.0, True),
+        (0.8, 0.0, True),
+        (0.85, 0.0, False),
+        (0.0, 0.2, True),
+        (0.0, 0.6, True),
+        (0.0, 0.9, False),
+    ],
 )
 def test_one_surface_is_a_matter_of_offset_and_angle(height, tilt, good):
     one, other = pennies(0.1, height=height - A * np.sin(tilt), tilt=tilt)
     mesh = box((-3, -2, -2), (3, 2, 2), (6, 4, 4))
     gap = gap_between(one, other, Body.of(mesh), 1.0)
     assert gap.in_surface(0.4) == good
-    assert gap.offset == pytest.approx(height + 0.1 * np.sin(tilt), abs=0.11)
+    assert gap.faces
+    if good:
+        assert gap.offset == pytest.approx(height + 0.1 * np.sin(tilt), abs=0.11)
+        # A step leads across.
+        both = merged_crack(one, other, 0.4, 0.1, 0.82)
+        assert len(both.fronts) == 1
+        assert len(both.faces) > len(one.faces) + len(other.faces)
 
 
 def test_cracks_beside_each_other_are_bridged_over_a_small_offset():

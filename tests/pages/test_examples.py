@@ -17,6 +17,7 @@ IN_SPACE = (
     "semi_elliptic_growth",
     "corner_crack_at_hole",
     "small_crack",
+    "weld_toe",
 )  # seconds with --quick
 MANY = ("flaw_campaign",)  # minutes without --quick
 PLANE = [path for path in EXAMPLES if path.stem not in (*IN_SPACE, *MANY)]

@@ -10,6 +10,9 @@ from scipy.interpolate import PchipInterpolator
 
 import xcrack as xc
 from xcrack.fem.system import discretise
+from xcrack.output.lip_faces_3d import junction_lines, lip_faces
+from xcrack.view.matplotlib_3d import draw_cracks
+from xcrack.view.view_3d import solution_layers
 
 DATA = Path(__file__).parents[1] / "data"
 STEEL = xc.Isotropic(1e5, 0.3)
@@ -259,6 +262,24 @@ def test_closed_crossing(friction):
         assert mean == pytest.approx(100.0, rel=1e-6)
     plain = xc.solve(scene([], loads=loads)).energy
     assert solution.energy == pytest.approx(plain, rel=1e-8)
+
+
+@pytest.mark.slow
+def test_a_junction_is_seen_as_a_line(tmp_path):
+    """As long as the arm is wide, in pictures and in the viewer of reports; no mouth beside it."""
+    solution = xc.solve(scene(crossing(), contact="off"))
+    arms = [lip_faces(solution, c) for c in (1, 2)]
+    for lips in arms:
+        ends = lips.points[lips.junction]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+        assert length == pytest.approx(0.7, rel=0.02)  # the front is a polygon
+        assert ends[..., 2] == pytest.approx(0.017, abs=1e-9)
+    assert not any(len(lip_faces(solution, c).mouth) for c in range(3))
+    assert len(junction_lines(solution, 0)) == 2
+    layers = {layer["name"]: layer["n"] for layer in solution_layers(solution)}
+    assert layers["junctions"] == sum(len(lips.junction) for lips in arms)
+    draw_cracks(solution, "opening", [0, 1], tmp_path / "map.png", False, None, None, None)
+    xc.plot(solution, "opening", file=tmp_path / "opening.png")
 
 
 @pytest.mark.slow

@@ -21,8 +21,10 @@ from xcrack.mesh.locate import Body
 from xcrack.mesh.polygon import cross, ear_clipped, self_crossing, without_slivers
 from xcrack.mesh.triangulation import rim, unit
 
-_ANGLE = np.cos(np.radians(20.0))  # normals of both cracks may differ by as much
-OFFSET = 0.5  # of a cell: one crack may lie as far beside the surface of the other
+_ANGLE = np.cos(np.radians(20.0))  # normals of both pieces of a front may differ by as much
+_TILT = np.cos(np.radians(45.0))  # and those of two cracks
+OFFSET = 0.5  # of a cell: both lie in one surface up to that, and beyond it a step leads across
+STEP = 2.05  # cells: the highest step; farther apart fronts pass each other
 _NEAR = 1.1  # cells between two fronts of a crack below which they join
 _WIDE = 2.0  # cells between two ends of fronts behind a hole below which they join
 _FACES = 0.3  # cosine between the direction ahead of a front and another one that it meets
@@ -44,16 +46,19 @@ class FrontGap:
         Cosine between the normals there; negative where one crack looks the other way.
     x : (3,) array, length
         Half way between the two.
+    faces : bool
+        Whether a front is nearest there, and not a face of the other crack.
     """
 
     width: float
     offset: float
     turn: float
     x: Floats
+    faces: bool
 
-    def in_surface(self, size: float, most: float = OFFSET) -> bool:
-        """Whether both lie in one surface, up to a share of a size."""
-        return abs(self.turn) >= _ANGLE and self.offset <= most * size
+    def in_surface(self, size: float) -> bool:
+        """Whether both lie in one surface, or one within a step of that of the other."""
+        return abs(self.turn) >= _TILT and self.offset <= STEP * size
 
 
 def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap | None:
@@ -91,8 +96,18 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
             row = rows[k]
             if best is None or along[k] < best.width:
                 turn = float(tree.normal[closest.triangle[row]] @ normal[row])
-                best = FrontGap(float(along[k]), float(abs(across[k])), turn, x[row] + way[k] / 2)
+                faces = _is_on_front(b, closest.foot[row], tree.tiny)
+                best = FrontGap(
+                    float(along[k]), float(abs(across[k])), turn, x[row] + way[k] / 2, faces
+                )
     return best
+
+
+def _is_on_front(crack: Crack, x: Floats, tiny: float) -> bool:
+    return any(
+        front_distance(x[None], front.x, front.closed, np.inf)[0][0] <= 10 * tiny
+        for front in front_frames(crack)
+    )
 
 
 def turned_crack(crack: Crack) -> Crack:
@@ -101,8 +116,15 @@ def turned_crack(crack: Crack) -> Crack:
     return Crack(crack.points, crack.faces[:, ::-1], crack.tips, fronts)
 
 
-def merged_crack(one: Crack, other: Crack, radius: float, size: float) -> Crack:
-    """Two cracks that lie in one surface, and nearly touch, as one.
+def merged_crack(
+    one: Crack,
+    other: Crack,
+    radius: float,
+    size: float,
+    step: float = 0.0,
+    body: Body | None = None,
+) -> Crack:
+    """Two cracks that lie in one surface, or a step apart, and nearly touch, as one.
 
     Parameters
     ----------
@@ -112,6 +134,10 @@ def merged_crack(one: Crack, other: Crack, radius: float, size: float) -> Crack:
         Of the disc that closes the gap.
     size : float, length
         Spacing of new front points.
+    step : float, length
+        By which one may lie beside the surface of the other.
+    body : Body, optional
+        Ends of fronts outside it may lie across each other: as much of them is left out.
 
     Returns
     -------
@@ -136,10 +162,31 @@ def merged_crack(one: Crack, other: Crack, radius: float, size: float) -> Crack:
     trees = tuple(triangle_tree(c.points, c.faces) for c in (other, one))
 
     def blocked(tree: TriangleTree) -> Callable[[Front], Bools]:
-        return lambda front: _blocked_points(front, tree, radius)
+        return lambda front: _blocked_points(front, tree, radius, step)
 
     facing = (front_frames(one), front_frames(shifted))
-    return _with_gap_closed(both, facing, (), tuple(map(blocked, trees)), radius, size)
+    flags = tuple(map(blocked, trees))
+
+    if body is None:
+        return _with_gap_closed(both, facing, (), flags, radius, size)
+
+    def closed(count: int) -> Crack:
+        short = tuple([_with_short_ends(f, count, body) for f in group] for group in facing)
+        return _with_gap_closed(both, (short[0], short[1]), (), flags, radius, size)
+
+    return _first_that_closes(closed, facing)
+
+
+def _first_that_closes(closed: Callable[[int], Crack], groups: Sequence[Sequence[Front]]) -> Crack:
+    """A gap closed between fronts with all, or a few, of their points outside the body."""
+    whole = max(len(front.x) for group in groups for front in group)
+    is_open = any(not front.closed for group in groups for front in group)
+    for count in (whole, *range(8, -1, -1)) if is_open else (whole,):
+        try:
+            return closed(count)
+        except GeometryError as error:
+            failure = error
+    raise failure
 
 
 @dataclass(frozen=True, eq=False)
@@ -460,20 +507,14 @@ def _join(
 
         return ahead
 
-    whole = max(len(front.x) for front in pair)
-    for count in (whole, *range(8, 0, -1)):
-        short = (
-            _with_short_ends(pair[0], count, body),
-            _with_short_ends(pair[1], count, body),
-        )
-        try:
-            return _with_gap_closed(
-                Crack(crack.points, crack.faces), ([short[0]], [short[1]]), rest,
-                (blocked(0, short), blocked(1, short)), radius, radius / 2,
-            )  # fmt: skip
-        except GeometryError as error:
-            failure = error
-    raise failure
+    def closed(count: int) -> Crack:
+        short = tuple(_with_short_ends(front, count, body) for front in pair)
+        return _with_gap_closed(
+            Crack(crack.points, crack.faces), ([short[0]], [short[1]]), rest,
+            (blocked(0, short), blocked(1, short)), radius, radius / 2,
+        )  # fmt: skip
+
+    return _first_that_closes(closed, (pair,))
 
 
 def _nearest_ends(one: Front, other: Front, body: Body) -> tuple[int, int] | None:
@@ -559,11 +600,18 @@ class _Patch:
     used: Ints
 
 
-def _blocked_points(front: Front, tree: TriangleTree, radius: float) -> Bools:
-    """Points of a front ahead of which a disc cannot lie without entering the other crack."""
+def _blocked_points(front: Front, tree: TriangleTree, radius: float, step: float) -> Bools:
+    """Points of a front ahead of which a disc cannot lie without entering the other crack.
+
+    Beyond a step the other crack is seen as it lies along the surface.
+    """
     centre = front.x + radius * front.frame[:, 0]
-    closest = closest_in(tree, centre, radius)
-    return np.asarray((closest.triangle >= 0) & (closest.distance < radius * (1 - 1e-9)))
+    closest = closest_in(tree, centre, float(np.hypot(radius, step)))
+    way = closest.foot - centre
+    across = np.einsum("ij,ij->i", way, front.frame[:, 1])
+    along = np.sqrt(np.maximum(closest.distance**2 - across**2, 0.0))
+    distance = np.where(np.abs(across) <= step, along, closest.distance)
+    return np.asarray((closest.triangle >= 0) & (distance < radius * (1 - 1e-9)))
 
 
 def _runs(front: Front, blocked: Bools) -> list[FacingPart]:
@@ -709,6 +757,7 @@ def _chains(following: dict[int, int]) -> list[Ints]:
 
 __all__ = [
     "OFFSET",
+    "STEP",
     "FrontGap",
     "OwnGap",
     "gap_between",

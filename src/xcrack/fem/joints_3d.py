@@ -17,7 +17,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cut_simplices
 
 _ROUND_OFF = 1e-13  # share of a cell below which a distance is zero
-_SINE = np.sin(np.radians(15.0))  # of the smallest angle between two cracks that meet
+_SINE = np.sin(np.radians(10.0))  # of the smallest angle between two cracks that meet
 
 
 def joined_cuts(
@@ -94,7 +94,7 @@ def _check(
         cell = int(cells[int(np.argmin(sine))])
         raise GeometryError(
             f"crack {c} meets crack {on} at {np.degrees(np.arcsin(sine.min())):.2g} degrees at "
-            f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}, or lies along it: below 15 degrees "
+            f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}, or lies along it: below 10 degrees "
             "they are not told apart. Leave out what lies along the other crack, or give both as "
             "one surface."
         )

@@ -22,6 +22,7 @@ from xcrack.crack.junctions_3d import (
 from xcrack.crack.measures import crack_size
 from xcrack.crack.merging import (
     OFFSET,
+    STEP,
     FrontGap,
     OwnGap,
     gap_between,
@@ -46,7 +47,8 @@ from xcrack.mesh.mesh import Mesh
 _LIGAMENT = 0.9  # cells: radius of a ligament inside a front below which it breaks
 _OWN = "of the same crack"  # what advancing says of a front that meets its own crack
 _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be solved
-_BESIDE = 1.0  # cells that fronts may pass beside each other at the end of the whole advance
+_WIDER = 0.75  # of a gap: the disc is as large where a step leads across
+_STEEP = 0.5  # of the height of a step of a cell or more: the gap over which it leads
 _AHEAD = 1.8  # legs of cells before a face in which no front can be solved: it is led through
 _LEFT = 0.25  # of a cell: the gap that is closed at once
 _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined front
@@ -82,7 +84,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         return own or plan
     if len(plan.cracks) < 2:
         return plan
-    close = _close(plan.cracks, body, _BESIDE)
+    close = _close(plan.cracks, body, step.corrected)
     facing = {pair for pair, _, _ in close}  # their fronts join; faces are those of other pairs
     faces = [pair for pair in _faces_met(plan.cracks, body) if pair not in facing]
     if not close and not faces:
@@ -108,10 +110,12 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         now[met.crack] = place_arm(now, met.crack, rule.problem.mesh)
         joins.append(Join(step.index + 1, step.cycles + cycles, tuple(met.x.tolist()), pair))
     number = list(range(len(now)))
-    while pairs := _close(now, body, OFFSET):
+    while pairs := _close(now, body):
         (i, k), gap, size = pairs[0]
         other = now[k] if gap.turn > 0 else turned_crack(now[k])
-        now[i] = merged_crack(now[i], other, _RADIUS * size, _SPACING * size)
+        across = STEP * size if gap.offset > OFFSET * size else 0.0
+        radius = max(_RADIUS * size, _WIDER * gap.width)
+        now[i] = merged_crack(now[i], other, radius, _SPACING * size, across, body)
         x = tuple(gap.x.tolist())
         joins.append(Join(step.index + 1, step.cycles + cycles, x, (number[i], number[k])))
         now = renumbered_arms(now, i, k, gap.turn > 0)
@@ -291,11 +295,12 @@ def _met_face(
 
 
 def _close(
-    cracks: Sequence[Crack], body: Body, beside: float
+    cracks: Sequence[Crack], body: Body, before: Sequence[Crack] = ()
 ) -> list[tuple[tuple[int, int], FrontGap, float]]:
     """Pairs of cracks in one surface whose fronts are too close to be solved, nearest first.
 
-    In one surface: within `beside` cells of each other across it.
+    Those beside each other by up to two cells are, too: a step leads across. Of fronts that come
+    there in an advance those count that faced each other before it.
 
     With each pair the gap between them, and the size of the cell there.
     """
@@ -304,13 +309,20 @@ def _close(
         x = np.concatenate([cracks[i].points[front] for front in cracks[i].fronts or ()])
         if not len(x) or may_touch(cracks, i, k):
             continue
-        gap = gap_between(cracks[i], cracks[k], body, 2 * float(body.cell_size(x).max()))
+        gap = gap_between(cracks[i], cracks[k], body, 3 * float(body.cell_size(x).max()))
         if gap is None:
             continue
         size = float(body.cell_size(gap.x[None])[0])
-        if gap.width < _NEAR * size and gap.in_surface(size, beside):
+        if gap.width >= _NEAR * size or not gap.in_surface(size):
+            continue
+        if gap.faces if not before else _is_facing(before[i], before[k], body):
             result.append(((i, k), gap, size))
     return sorted(result, key=lambda each: each[1].width / each[2])
+
+
+def _is_facing(one: Crack, other: Crack, body: Body) -> bool:
+    gap = gap_between(one, other, body, np.inf)
+    return gap is not None and gap.faces
 
 
 def _met(
@@ -338,13 +350,17 @@ def _met(
         Time at the rates of the beginning.
     """
     i, k = pair
-    # Over an offset a wider gap is closed, so that no face stands steeper than 45 degrees.
-    share_left = float(np.clip(near.offset / size, _LEFT, OFFSET))
+    # Over an offset a wider gap is closed: of half a cell, or half as wide as a high step.
+    high = near.offset / size
+    share_left = float(np.clip(high, _LEFT, max(OFFSET, _STEEP * high)))
     way = _share(rule, step, plan, pair, size, share_left, body)
     first = gap_between(step.corrected[i], step.corrected[k], body, np.inf)
     gap, left = (0.0 if first is None else first.width), share_left * size
     if gap <= left:
         return way, way, way
+    # What is left over a step breaks at once: its cycles would be those of fronts that pass.
+    beyond = left - _LEFT * size
+    gap, left = gap - beyond, left - beyond
     a = 2 * float(np.mean([step.sizes[c] for c in pair]))  # of a penny: its radius
     plain = way * gap / (gap - left)
     time = plain * part_of_time(gap / a, exponent, 3)
@@ -394,6 +410,8 @@ def _share(
         at_high = excess(high)
     if at_high > 0 or not np.isfinite(at_low):
         return high
+    if at_low <= 0:
+        return 0.0
     for _ in range(_TRIES):
         # Where fronts overlap the gap is zero and says nothing of how far: then halve.
         part = at_low / (at_low - at_high) if at_high > -0.99 * left else 0.5

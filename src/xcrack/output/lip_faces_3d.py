@@ -8,8 +8,10 @@ from scipy.spatial import cKDTree
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.fem.quadrature import lip_side
+from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import rim
 
+_AT_SIDE = 1e-6  # share of a cell within which the middle of an edge lies on the boundary
 _SAME = 1e-9  # share of a cell within which vertices are one, or lie on a front
 
 
@@ -35,6 +37,8 @@ class LipFaces:
         Share of each triangle on which the crack faces touch.
     front : (k, 2) array of int
         Edges on the fronts.
+    junction : (j, 2) array of int
+        Edges on other cracks, on which the crack ends.
     mouth : (m, 2) array of int
         The other edges with one triangle: where the crack leaves the body.
     """
@@ -50,6 +54,7 @@ class LipFaces:
     mean_gap: Floats
     closed: Floats
     front: Ints
+    junction: Ints
     mouth: Ints
 
     @property
@@ -118,6 +123,13 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     edges, row = rim(triangles)
     on_front = _on_front(solution, crack, one)
     ahead = on_front[edges].all(axis=1) & (area[row] > 0)
+    ends = _on_other(solution, crack, one)[edges].all(axis=1) & ~ahead
+    leaves = ~ahead & ~ends
+    if any(crack in (joint.crack, joint.on) for joint in space.joints):
+        # Faces that an arm splits lie beside whole ones: such edges are no mouth.
+        middle = corners.reshape(-1, 3)[one][edges].mean(axis=1)
+        depth, size = Body.of(mesh).depth(middle)
+        leaves &= np.abs(depth) < _AT_SIDE * size
     return LipFaces(
         points=lock(corners.reshape(-1, 3)[one]),
         triangles=lock(triangles),
@@ -130,8 +142,31 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
         mean_gap=mean(solution.opening(crack) if contact is None else contact.gap),
         closed=mean(nothing if contact is None else contact.closed.astype(float)),
         front=lock(edges[ahead]),
-        mouth=lock(edges[~ahead]),
+        junction=lock(edges[ends]),
+        mouth=lock(edges[leaves]),
     )
+
+
+def junction_lines(solution: Solution, crack: int | None = None) -> list[tuple[LipFaces, Ints]]:
+    """Faces of cracks that end on others, and their edges there: of all, or those at one."""
+    arms = {
+        joint.crack
+        for joint in solution.space.joints
+        if crack is None or crack in (joint.crack, joint.on)
+    }
+    return [(lips, lips.junction) for lips in (lip_faces(solution, arm) for arm in sorted(arms))]
+
+
+def _on_other(solution: Solution, crack: int, one: Ints) -> Bools:
+    """Which vertices of the triangles of a crack lie on one on which it ends `(n,)`."""
+    space, cut = solution.space, solution.space.cuts[crack]
+    cells, bary = cut.lip_cell[one // 3, 0], cut.lip_bary[one // 3, 0, one % 3]
+    corners, result = space.mesh.cells[cells], np.zeros(len(one), dtype=bool)
+    for joint in space.joints:
+        if joint.crack == crack:
+            phi = space.cuts[joint.on].level_set.phi[corners]
+            result |= np.abs((bary * phi).sum(axis=1)) < _SAME * space.mesh.cell_size[cells]
+    return result
 
 
 def _merged_numbers(x: Floats, distance: float) -> Ints:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.base.arrays import Floats
-from xcrack.output.lip_faces_3d import LipFaces, lip_faces
+from xcrack.base.arrays import Floats, Ints
+from xcrack.output.lip_faces_3d import LipFaces, junction_lines, lip_faces
 from xcrack.view.figures import finish_figure, new_figure
 from xcrack.view.projection import Projection, best_plane, on_plane
 from xcrack.view.scene_2d import CLOSED, rounded_range
@@ -45,7 +45,8 @@ def draw_cracks(
         low, high = limits
     colours = cmap or ("RdBu_r" if low < 0 < high else "viridis")
     for axes, each, plane, c in zip(every, lips, planes, cracks, strict=True):
-        _map(figure, axes, each, plane, field, (low, high), colours)
+        meets = junction_lines(solution, c)
+        _map(figure, axes, each, meets, plane, field, (low, high), colours)
         if len(solution.lips) > 1:
             axes.set_title(f"crack {c}", fontsize="medium", loc="left")
     if title:
@@ -57,6 +58,7 @@ def _map(
     figure: Any,
     axes: Any,
     lips: LipFaces,
+    meets: list[tuple[LipFaces, Ints]],
     plane: Projection,
     field: str,
     limits: tuple[float, float],
@@ -89,18 +91,20 @@ def _map(
             PolyCollection(parts, facecolors=color, edgecolors=color, linewidths=0.3)
         )
         axes.plot([], [], "s", color=color, label=label)
-    for edges, line, width, name in (
-        (lips.mouth, "black", 1.2, "mouth"),
-        (lips.front, "#d95f02", 1.8, "front"),
+    junction = [on_plane(other.points, plane)[edges] for other, edges in meets]
+    for segments, line, width, name in (
+        (x[lips.mouth], "black", 1.2, "mouth"),
+        (np.concatenate([np.zeros((0, 2, 2)), *junction]), "#7b3294", 1.8, "junction"),
+        (x[lips.front], "#d95f02", 1.8, "front"),
     ):
-        if len(edges):
-            axes.add_collection(LineCollection(list(x[edges]), colors=line, linewidths=width))
+        if len(segments):
+            axes.add_collection(LineCollection(list(segments), colors=line, linewidths=width))
             axes.plot([], [], color=line, lw=width, label=name)
     axes.set_aspect("equal")
     axes.set(xlabel=plane.label(0), ylabel=plane.label(1))
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(
-        fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3
+        fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4
     )
     figure.colorbar(mapped, ax=axes, label=LIP_FIELDS[field], shrink=0.9, aspect=18)
 

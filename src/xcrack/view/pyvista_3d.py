@@ -27,7 +27,7 @@ _APART = "#c9ccd1"  # lips that do not touch, where the pressure is drawn
 _TRIAD = 130  # pixels of the axes
 _LEGEND = 28  # pixels of a line of the legend
 _LOADS = "#1b4f9c"
-_FRONT = "#d95f02"
+_FRONT, _JUNCTION = "#d95f02", "#7b3294"
 
 
 def draw_space(
@@ -132,6 +132,7 @@ def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
         "faint_lines",
         "rims",
         "fronts",
+        "junctions",
     )
     other_parts: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
     triangles, values = cut(picture.triangles, picture.values)
@@ -180,6 +181,7 @@ def _add_lines(pv: Any, plotter: Any, picture: SpaceScene, edges: bool, step: Fl
         (picture.cell_edges if edges else nothing, "#303030", 1.0, 1),
         (picture.outline, "#404040" if len(picture.skin) else "black", 2.0, 1.5),
         (picture.rims, "black", 2.5, 2),
+        (picture.junctions, _JUNCTION, 6.0, 3),
         (picture.fronts, _FRONT, 6.0, 3),
     ]
     for segments, color, width, level in lines:
@@ -224,6 +226,7 @@ def _legend(picture: SpaceScene) -> list[tuple[str, str]]:
         (len(picture.closed_faces), crack, CLOSED),
         (len(picture.open_faces), "crack faces apart", "#8d9299"),
         (len(picture.fronts), "front", _FRONT),
+        (len(picture.junctions), "junction", _JUNCTION),
         (len(picture.heaviside), "Heaviside", "#1f77b4"),
         (len(picture.tip), "tip functions", "#ff7f0e"),
     ]

@@ -12,7 +12,7 @@ from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints
 from xcrack.output.curved_sides import CurvedSides
-from xcrack.output.lip_faces_3d import LipFaces, lip_faces
+from xcrack.output.lip_faces_3d import LipFaces, junction_lines, lip_faces
 from xcrack.output.pieces import pieces
 from xcrack.view.scene_2d import (
     STRESSES,
@@ -66,10 +66,10 @@ class SpaceScene:
         Triangles of a crack that are not coloured: its faces touch there, or do not.
     skin : (s, 3, 3) array, length
         Surface of a body that is seen through.
-    outline, cell_edges, faint_lines, rims, fronts : (k, 2, 3) arrays, length
+    outline, cell_edges, faint_lines, rims, fronts, junctions : (k, 2, 3) arrays, length
         Lines: sharp edges of the body and its section, edges of cells, what is only hinted at
         (the body that has not moved, the edges of cells behind the rest), edges of the crack faces,
-        fronts.
+        fronts, and where cracks end on others.
     view_direction : (3,) array
         Unit vector from the body to the viewer.
     heaviside, tip : (k, 3) arrays, length
@@ -91,6 +91,7 @@ class SpaceScene:
     faint_lines: Floats
     rims: Floats
     fronts: Floats
+    junctions: Floats
     view_direction: Floats
     heaviside: Floats
     tip: Floats
@@ -209,6 +210,7 @@ def space_scene(
         faint_lines=outline_rest if warp else np.zeros((0, 2, 3)),
         rims=curves[1],
         fronts=_front_lines(solution, warp, plane)[: None if plane is not None else 0],
+        junctions=_junction_lines(solution, warp, plane)[: None if plane is not None else 0],
         view_direction=_viewing_direction(plane, view, None),
         heaviside=np.zeros((0, 3)),
         tip=np.zeros((0, 3)),
@@ -342,6 +344,7 @@ def _seen_through(
         faint_lines=np.concatenate(faint) if with_cells else empty,
         rims=empty,
         fronts=_front_lines(solution, warp, None),
+        junctions=_junction_lines(solution, warp, None),
         view_direction=np.array([0.0, -1.0, 0.0]),
         heaviside=np.zeros((0, 3)),
         tip=np.zeros((0, 3)),
@@ -370,10 +373,19 @@ def _middle_of_lips(lips: LipFaces, warp: float) -> Floats:
 
 
 def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats:
+    every = [lip_faces(solution, c) for c in range(len(solution.lips))]
+    return _lines_behind([(lips, lips.front) for lips in every], warp, plane)
+
+
+def _junction_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats:
+    return _lines_behind(junction_lines(solution), warp, plane)
+
+
+def _lines_behind(edges: list[tuple[LipFaces, Ints]], warp: float, plane: Plane | None) -> Floats:
+    """Edges of crack faces as segments `(k, 2, 3)`, as far as they lie behind a plane."""
     parts = [np.zeros((0, 2, 3))]
-    for c in range(len(solution.lips)):
-        lips = lip_faces(solution, c)
-        behind = segments_behind(lips.front, levels(lips.points, plane))
+    for lips, pairs in edges:
+        behind = segments_behind(pairs, levels(lips.points, plane))
         parts += [part.at(_middle_of_lips(lips, warp)) for part in behind]
     return np.concatenate(parts)
 

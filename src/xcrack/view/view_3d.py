@@ -16,7 +16,7 @@ from xcrack.view.section_3d import boundary_edges
 
 MOST = 250_000  # triangles that are packed; seven bytes a corner
 _GREY, _EDGE = (143, 163, 184), (64, 64, 64)
-_CRACK, _FRONT = (214, 96, 77), (178, 24, 43)
+_CRACK, _FRONT, _JUNCTION = (214, 96, 77), (178, 24, 43), (123, 50, 148)
 
 
 def solution_layers(solution: Solution) -> list[dict[str, Any]]:
@@ -35,6 +35,7 @@ def solution_layers(solution: Solution) -> list[dict[str, Any]]:
                    _coloured_layer(lips.values, lips.limits), 1.0),
             _layer("crack: faces that touch", "triangles", lips.closed_faces, (110, 110, 110), 1.0),
             _layer("fronts", "lines", lips.fronts, _FRONT, 1.0),
+            _layer("junctions", "lines", lips.junctions, _JUNCTION, 1.0),
         ]  # fmt: skip
     return [layer for layer in layers if layer["n"]]
 

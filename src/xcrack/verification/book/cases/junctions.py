@@ -6,10 +6,14 @@ import numpy as np
 
 from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats
+from xcrack.crack.junctions_3d import arm
 from xcrack.crack.lines import line_crack
+from xcrack.crack.surfaces import plane_crack
+from xcrack.mesh.box import box
 from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
+from xcrack.model.supports import fix
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.scenes_2d import NU, E, perturbed
@@ -67,6 +71,35 @@ def _pressed(level: int) -> list[Value]:
 
 _SOURCE = "conforming quarter-point triangles (benchmarks/baselines/network_2d.py)"
 
+
+def _slice(level: int) -> list[Value]:
+    """The T through a slice in plane strain: an arm on another crack in space."""
+    del level
+    across = [
+        plane_crack([(x, y, z) for (x, z), y in zip((a, a, b, b), (0.6, -0.6, -0.6, 0.6))])
+        for a, b in ((_RIGHT, _LEFT), (_ON - 0.6 * (_UP - _ON), _UP))
+    ]
+    sides = {"left": (-1, 0), "right": (1, 0), "top": (0, 1), "bottom": (0, -1)}
+    forces = {name: OPEN @ np.array(n) for name, n in sides.items()}
+    problem = Problem(
+        box((-1, -0.2, -1), (1, 0.2, 1), (21, 3, 21)),
+        Isotropic(E, NU),
+        [across[0], arm(across[1], on=0, side=-1)],
+        loads=[traction(name, (t[0], 0.0, t[1])) for name, t in forces.items()],
+        supports=[fix("front", axis=1), fix("back", axis=1)],
+        contact="off",
+    )
+    solution, rows = solve(problem), []
+    for c in (0, 1):
+        sif = stress_intensity(solution, c)
+        for f in np.unique(sif.front):
+            own = sif.front == f
+            rows.append((sif.x[own, 0].mean(), *np.abs(sif.K[own, :2]).mean(axis=0)))
+    K_space = np.array([row[1:] for row in sorted(rows[:2]) + rows[2:]])
+    wrong = np.abs(K_space - np.abs(K["T"])).max(axis=1) / np.linalg.norm(K["T"], axis=1)
+    return [Value(f"error of K, front {k}", float(e), 0.0, 2e-3, 1.0) for k, e in enumerate(wrong)]
+
+
 CASES = (
     *(
         Case(f"junction-{name}", "junctions", _SOURCE, "program", 2, 2, False,
@@ -74,6 +107,7 @@ CASES = (
         for name in LINES
     ),
     Case("junction-pressed", "junctions", _SOURCE, "program", 2, 2, True, _pressed, 2),
+    Case("junction-space", "junctions", _SOURCE, "program", 3, 2, False, _slice, quick=False),
 )  # fmt: skip
 
 

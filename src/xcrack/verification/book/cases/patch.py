@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 
 from xcrack.analysis.solve import solve
+from xcrack.crack.junctions_3d import arm
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.mesh.box import box
@@ -80,6 +81,27 @@ def _space(level: int) -> list[Value]:
     return values
 
 
+def _crossing(level: int) -> list[Value]:
+    """Two pennies that cross, given as one and two arms."""
+    del level
+    S, x = -_P * np.eye(3), (0.013, 0.0, 0.017)
+    other = penny_crack(x, (1, 0, 0), 0.35)
+    problem = Problem(
+        box((-1,) * 3, (1,) * 3, 13),
+        Isotropic(E, NU),
+        [penny_crack(x, (0, 0, 1), 0.65), arm(other, on=0, side=1), arm(other, on=0, side=-1)],
+        supports=[displacement("boundary", lambda x: fields_3d.uniform_stress_3d(x, S, E, NU)[0])],
+        contact="on",
+        order=1,
+    )
+    values = []
+    for c, contact in enumerate(solve(problem).contact):
+        assert contact is not None
+        deviation = float(np.abs(contact.pressure - _P).max() / _P)
+        values.append(Value(f"deviation, face {c}", deviation, 0.0, 1e-5, 1.0))
+    return values
+
+
 CASES = (
     *(
         Case(f"patch-{order}", "patch", _SOURCE, "exact", 2, order, True,
@@ -93,6 +115,8 @@ CASES = (
     ),
     Case("patch-3D", "patch", _SOURCE + ", to the tolerance of the iteration", "exact", 3, 1, True,
          _space),
+    Case("patch-crossing", "patch", _SOURCE + ", to the tolerance of the iteration", "exact", 3, 1,
+         True, _crossing, quick=False),
 )  # fmt: skip
 
 
