@@ -196,7 +196,11 @@ def slid_pennies():
 
 def overloaded_pennies():
     spectrum = xc.Spectrum([*([0.05, 0.5] * 200), 0.05, 1.0])
-    return pennies(height=0.5), spectrum, {"retardation": xc.wheeler(0.5, xc.plastic_zone(9.0))}
+    return (
+        pennies(height=0.5),
+        spectrum,
+        {"retardation": xc.wheeler(0.5, xc.plastic_zone(1.5, beta=6))},
+    )
 
 
 @pytest.mark.slow
