@@ -232,4 +232,4 @@ def _on_front(solution: Solution, crack: int, one: Ints) -> Bools:
     return flag
 
 
-__all__ = ["LipFaces", "lip_faces"]
+__all__ = ["LipFaces", "junction_lines", "lip_faces"]
