@@ -208,6 +208,10 @@ def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
     assert counts[-1] == 1
     assert np.median(apart) < 0.04
     assert max(apart) < 0.2
+    joined = len(counts) - counts[::-1].index(2)
+    (join,) = run.joins
+    assert (join.step, join.cracks, join.N) == (joined, (0, 0), run.steps[joined].cycles)
+    assert join.point == pytest.approx((-0.4 + 0.25, 0.0, 0.0), abs=0.2)
     split = counts.index(2)
     part = tmp_path / "part"
     shutil.copytree(tmp_path / "whole", part)

@@ -96,16 +96,16 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
             row = rows[k]
             if best is None or along[k] < best.width:
                 turn = float(tree.normal[closest.triangle[row]] @ normal[row])
-                faces = _is_on_front(b, closest.foot[row], tree.tiny)
+                faces = _is_on_front(b, closest.foot[row], tree.distance_tolerance)
                 best = FrontGap(
                     float(along[k]), float(abs(across[k])), turn, x[row] + way[k] / 2, faces
                 )
     return best
 
 
-def _is_on_front(crack: Crack, x: Floats, tiny: float) -> bool:
+def _is_on_front(crack: Crack, x: Floats, tolerance: float) -> bool:
     return any(
-        front_distance(x[None], front.x, front.closed, np.inf)[0][0] <= 10 * tiny
+        front_distance(x[None], front.x, front.closed, np.inf)[0][0] <= 10 * tolerance
         for front in front_frames(crack)
     )
 
@@ -354,6 +354,17 @@ def through_holes(
     return chains
 
 
+def ends_at_holes(crack: Crack, body: Body) -> list[Floats]:
+    """Middles of the gaps across which fronts of a placed crack run on, length."""
+    fronts, result = front_frames(crack), []
+    for row, goes_round in through_holes(crack, fronts, body):
+        pairs = list(zip(row, row[1:]))
+        if goes_round and not fronts[row[0]].closed:
+            pairs.append((row[-1], row[0]))
+        result += [(fronts[i].x[-1] + fronts[j].x[0]) / 2 for i, j in pairs]
+    return result
+
+
 def joined_fronts(crack: Crack, body: Body) -> Crack | None:
     """A crack two of whose fronts have met, with one front in their place; None where none have.
 
@@ -508,7 +519,7 @@ def _join(
         return ahead
 
     def closed(count: int) -> Crack:
-        short = tuple(_with_short_ends(front, count, body) for front in pair)
+        short = (_with_short_ends(pair[0], count, body), _with_short_ends(pair[1], count, body))
         return _with_gap_closed(
             Crack(crack.points, crack.faces), ([short[0]], [short[1]]), rest,
             (blocked(0, short), blocked(1, short)), radius, radius / 2,
@@ -760,6 +771,7 @@ __all__ = [
     "STEP",
     "FrontGap",
     "OwnGap",
+    "ends_at_holes",
     "gap_between",
     "joined_fronts",
     "merged_crack",

@@ -8,8 +8,10 @@ import numpy as np
 from xcrack.base.arrays import Floats, at, coordinates
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import exit_ahead, facet_names, front_ends
 from xcrack.crack.meetings import new_ends, new_unions
+from xcrack.crack.merging import ends_at_holes
 from xcrack.crack.stations import place_crack
 from xcrack.fem.system import discretise
 from xcrack.growth import joins_3d
@@ -53,15 +55,38 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
 def joins_of(step: Step, problem: Problem) -> tuple[Join, ...]:
     """Cracks that meet in the advance after a step: those of its plan, in 2D as they are placed."""
     plan = plan_of(step)
-    if problem.mesh.dim == 3:
-        return plan.joins
     N, index = step.cycles + plan.cycles, step.index + 1
+    if problem.mesh.dim == 3:
+        behind = _behind_holes(step, plan.cracks, problem)
+        return (*(Join(index, N, x, (c, c)) for c, x in behind), *plan.joins)
     ends = new_ends(step.corrected, problem.placed)
     unions = new_unions(step.corrected, problem.placed)
     return tuple(
         [Join(index, N, tuple(x.tolist()), (min(c, on), max(c, on))) for c, on, x in ends]
         + [Join(index, N, tuple(x.tolist()), pair) for pair, x in unions]
     )
+
+
+def _behind_holes(
+    step: Step, advanced: Sequence[Crack], problem: Problem
+) -> list[tuple[int, tuple[float, ...]]]:
+    """Cracks whose fronts at both sides of a hole have met behind it, and where."""
+    if len(advanced) < len(step.corrected):
+        return []
+    body, result = Body.of(problem.mesh), []
+    for c, (before, after) in enumerate(zip(step.corrected, problem.placed, strict=True)):
+        if not after.fronts or closed_fronts(before) == closed_fronts(after):
+            continue
+        gaps, left = ends_at_holes(before, body), ends_at_holes(after, body)
+        if len(gaps) <= len(left):
+            continue
+        x = np.concatenate([front.x for front in front_frames(after)])
+        # The gap that is gone is the one farthest from those that are left.
+        away = [min((float(np.linalg.norm(x - y)) for y in left), default=np.inf) for x in gaps]
+        middle = gaps[int(np.argmax(away))]
+        place = x[int(np.argmin(np.linalg.norm(x - middle, axis=1)))]
+        result.append((c, tuple(place.tolist())))
+    return result
 
 
 def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:

@@ -77,7 +77,7 @@ class Arrival(Event):
 class Join(Event):
     """Two cracks that became one, or a crack that runs into another one and ends there.
 
-    Or a ligament inside one crack that breaks: both numbers are that of the crack.
+    Or fronts of one crack that meet, behind a hole or around a ligament: both numbers are its own.
 
     Attributes
     ----------
