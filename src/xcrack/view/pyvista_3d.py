@@ -134,8 +134,6 @@ def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
         "fronts",
         "junctions",
     )
-        "junctions",
-    )
     other_parts: dict[str, Any] = {name: cut(getattr(picture, name))[0] for name in names}
     triangles, values = cut(picture.triangles, picture.values)
     return replace(picture, triangles=triangles, values=values, **other_parts)
