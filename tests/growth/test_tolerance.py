@@ -155,8 +155,12 @@ def resumed(folder, given, whole, stops):
     return other
 
 
-def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path):
-    """The first step is good enough on the mesh as given, the second is not; resumed on each."""
+def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path, monkeypatch):
+    """The first step is good enough on the mesh as given, the second is not; resumed on each.
+
+    With a stricter rule: so close to the begin all errors together never are above the tolerance.
+    """
+    monkeypatch.setattr(outgrown, "_WHOLE", 0.3)
     given = run_of(strip(5), tolerance=5e-4)
     whole = xc.collect(xc.grow(**given, max_steps=3), tmp_path / "whole")
     assert [step.run.meshes for step in whole.steps] == [0, 1, 1]
@@ -173,11 +177,16 @@ def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path):
 def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch):
     """A scout that has seen nothing of the way: a second one goes on from where that shows.
 
-    Without the stricter rule here the run holds its tolerance on the first mesh: most of the life
-    is over when the tip has left the fine cells.
+    Without the rules here the run holds its tolerance on the first mesh: most of the life is over
+    when the tip has left the fine cells.
     """
-    monkeypatch.setattr(outgrown, "_FORGIVEN", 1.0)
-    monkeypatch.setattr(outgrown, "_WHOLE", 0.5)
+    monkeypatch.setattr(outgrown, "_BEGIN", 0.1)
+    asks = outgrown._outgrown
+    monkeypatch.setattr(
+        outgrown,
+        "_outgrown",
+        lambda rule, last, step: asks(rule, last, step) or (rule.meshes == 1 and step.index == 6),
+    )
     real, begins = prepared.scouted, []
 
     def blind(run, scene, steps_of, begin=0):
@@ -187,7 +196,7 @@ def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch)
 
     monkeypatch.setattr(prepared, "scouted", blind)
     given = run_of(tolerance=1e-3)
-    whole = xc.collect(xc.grow(**given, max_steps=17), tmp_path / "whole")
+    whole = xc.collect(xc.grow(**given, max_steps=8), tmp_path / "whole")
     made = [step.run.meshes for step in whole.steps]
     assert len(begins) == 2
     assert begins[0] == 0 < begins[1]

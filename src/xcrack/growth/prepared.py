@@ -10,15 +10,31 @@ from typing import Protocol
 import numpy as np
 
 from xcrack.adaptivity.indicators import Indicators, indicators_of
+from xcrack.adaptivity.sizes_2d import growing_sizes, tip_sizes
 from xcrack.base.arrays import Floats
-from xcrack.base.errors import ProblemError, XcrackError, collected_warnings, warn
+from xcrack.base.errors import (
+    GeometryError,
+    ProblemError,
+    XcrackError,
+    collected_warnings,
+    warn,
+)
+from xcrack.crack.measures import exit_ahead
 from xcrack.fatigue.cycle import Cycle
 from xcrack.growth import sizes_2d, sizes_3d
 from xcrack.growth.corridor import corridor, ways_of
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.scout import Stage, samples, scouted
-from xcrack.growth.step import Step, plan_of, run_state
-from xcrack.growth.step_length import PATH, REJECTED, next_length
+from xcrack.growth.step import Step, plan_of, run_state, solves_of
+from xcrack.growth.step_length import (
+    PATH,
+    REJECTED,
+    STEPS,
+    cell_for,
+    first_length,
+    next_length,
+)
+from xcrack.growth.tips import LONGER_FIRST
 from xcrack.growth.uncertainty import TOGETHER
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
@@ -94,6 +110,9 @@ def prepared(
         if fingerprint(mesh) == known:
             return on(rule, replace(mesh, curves=rule.problem.mesh.curves))
     earlier = [step for step in done if run_state(step).mesh != known]
+    for mesh in _meshes_again(rule, steps_of, earlier, (first, *stored)):
+        if fingerprint(mesh) == known:
+            return on(rule, mesh)
     mesh, _ = finer(rule, steps_of, earlier[-1] if earlier else None)
     if fingerprint(mesh) != known:
         warn(
@@ -101,6 +120,21 @@ def prepared(
             "from it in the last bits: so may the steps that follow."
         )
     return on(rule, mesh)
+
+
+def _meshes_again(
+    rule: GrowthRule, steps_of: Steps, earlier: Sequence[Step], meshes: Sequence[Mesh]
+) -> list[Mesh]:
+    """Meshes that a run may have gone on with from earlier steps, but for those by a scout."""
+    if not earlier:
+        begin = next(steps_of(replace(rule, meshes=0, progress=False)))
+        return [solution.problem.mesh for solution in begin.solutions[:1]]
+    made = [
+        _mesh_with_room(on(rule, mesh), earlier[-1])
+        for mesh in meshes
+        if fingerprint(mesh) == run_state(earlier[-1]).mesh
+    ]
+    return [mesh for mesh in made if mesh is not None]
 
 
 def on(rule: GrowthRule, mesh: Mesh) -> GrowthRule:
@@ -161,8 +195,9 @@ def finer(rule: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, b
         return mesh, False
     _tell(rule, f"scout: {len(seen.stages)} steps, N = {seen.stages[-1].cycles:.4g}", start)
     ways = ways_of(seen)
-    # Of one that has begun long ago, most of the life is over.
-    chosen = samples(seen, twin.STAGES, 1.0 if last is not None and last.index else twin.LIFE)
+    # Of one that has begun long ago, most of the life is over; not where nothing of it is left.
+    most_of_life = 1 - float(rule.tolerance or 0.0)
+    chosen = samples(seen, twin.STAGES, most_of_life if last and last.index else twin.LIFE)
     stages = [seen.stages[k] for k in chosen]
     sizes = [twin.first_sizes(scene, stage) for stage in stages]
     sizes[0] = np.minimum(sizes[0], seen.step)
@@ -236,8 +271,14 @@ _FORGIVEN = 3.0  # times the share of K: bars along the way were foretold, not m
 
 _SETTLED = 4  # steps: before, bars are wide behind a kink whose face is short, on any mesh
 _SIZE = 0.5  # of a crack: of less growth than that a path may err by a share of as much
-_HALF, _WHOLE = 0.5, 0.8  # of the tolerance, by all sources: below that no finer mesh is worth it
-_BEGIN = 1.5  # times the share of K at the first step: bars of a crack that grows become shorter
+_WHOLE = 1.0  # of the tolerance, by all sources: below that no finer mesh is worth it
+_SLOPE = 0.4  # growth of cells with the distance from a tip that has little room
+# Times the share of K at the first step: bars of a crack that grows become shorter, and directions
+# err for the first step only.
+_BEGIN, _BEGIN_OF_PATH = 1.5, 3.0
+_SHORT_OF_PATH = 0.5  # of the tolerance: by K alone
+_LAST = 0.1  # of the cycles so far: what the rest may take at the present rate
+_SHORT = 1.3  # times a first step: the shortest that cells at kinks may allow
 
 
 def replanned(
@@ -259,14 +300,21 @@ def replanned(
         The one before, which is handed over.
     step : Step
     """
-    if _outgrown(rule, last, step):
-        mesh, is_largest = finer(asked, steps_of, last)
-        other = replace(on(rule, mesh), meshes=_MOST if is_largest else rule.meshes + 1)
-        return other, last if last is None else _with_room(rule, other, last, step)
-    if last is None:
+    mesh = _mesh_for_kinks(rule, step) if last is None else None
+    if mesh is not None:
+        return replace(on(rule, mesh), meshes=rule.meshes + 1), None
+    shorter = None if last is None else _shortened(last, step)
+    if shorter is not None:  # what the mesh leaves to be wished is seen on a step that stays
+        return rule, shorter
+    if not _outgrown(rule, last, step):
         return None
-    shorter = _shortened(last, step)
-    return None if shorter is None else (rule, shorter)
+    mesh, is_largest = _mesh_with_room(rule, last) if _has_no_bar(step) else None, False
+    if mesh is None and _ends_soon(rule, step):
+        return None
+    if mesh is None:
+        mesh, is_largest = finer(asked, steps_of, last)
+    other = replace(on(rule, mesh), meshes=_MOST if is_largest else rule.meshes + 1)
+    return other, last if last is None else _with_room(rule, other, last, step)
 
 
 def _shortened(last: Step, step: Step) -> Step | None:
@@ -281,6 +329,55 @@ def _shortened(last: Step, step: Step) -> Step | None:
     return replace(last, control=replace(control, length=length))
 
 
+def _ends_soon(rule: GrowthRule, step: Step) -> bool:
+    """Whether so little of the life is left to the last tip that no scout is worth its time."""
+    if rule.problem.mesh.dim == 3 or step.n_tips != 1 or not step.cycles > 0:
+        return False
+    stations, solves = solves_of(step)
+    hit = exit_ahead(stations.x[0], solves.direction[-1, 0], rule.problem.mesh)
+    if hit is None:
+        return False
+    room = float(np.linalg.norm(hit[0] - stations.x[0]))
+    return room <= _LAST * step.cycles * float(solves.rate[-1, 0])
+
+
+def _has_no_bar(step: Step) -> bool:
+    return step.error is not None and bool(np.isnan(step.error.rate))
+
+
+def _mesh_for_kinks(rule: GrowthRule, first: Step) -> Mesh | None:
+    """Finer cells at tips that kink at once, for a first step that a tolerance asks for.
+
+    None where that step has room.
+    """
+    if rule.meshes or rule.problem.mesh.dim == 3 or not rule.estimates or not first.n_tips:
+        return None
+    stations, solves = solves_of(first)
+    wanted = STEPS * float(rule.tolerance or 0.0)
+    length = first_length(LONGER_FIRST * float(solves.scale.min()), wanted, 0.0)
+    if not first.control.least > _SHORT * length:
+        return None
+    sizes = np.array([cell_for(length, angle) for angle in np.concatenate(first.angle).tolist()])
+    return refine(rule.problem.mesh, size=growing_sizes(stations.x, sizes, _SLOPE))
+
+
+def _mesh_with_room(rule: GrowthRule, last: Step | None) -> Mesh | None:
+    """Finer cells where the tips of the next step are too close to a boundary or to each other.
+
+    None where there are none, or other reasons leave no bar.
+    """
+    if last is None or rule.problem.mesh.dim == 3:
+        return None
+    try:
+        scene = replace(rule.problem, cracks=plan_of(last).cracks)
+        place, size = tip_sizes(scene)
+    except GeometryError:
+        return None
+    if (cell_sizes(scene.mesh, place) <= size).all():
+        return None
+    return refine(scene.mesh, size=growing_sizes(place, size, _SLOPE))
+
+
 def _outgrown(rule: GrowthRule, last: Step | None, step: Step) -> bool:
     """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
     error = step.error
@@ -293,19 +390,23 @@ def _outgrown(rule: GrowthRule, last: Step | None, step: Step) -> bool:
     forgiven = 1.0 if rule.meshes == 0 else _FORGIVEN
     rate, turn = _local(rule, step)
     before_it = (np.inf, np.inf) if rule.meshes == 0 or last is None else _local(rule, last)
-    rate, turn = min(rate, before_it[0]), min(turn, before_it[1])
+    if rule.meshes and _has_no_bar(step) and _mesh_with_room(rule, last) is None:
+        return False
+    if not _has_no_bar(step):
+        rate, turn = min(rate, before_it[0]), min(turn, before_it[1])
     of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
     if last is None:
-        return rate > _BEGIN * of_life or turn > _BEGIN * of_path
+        return rate > _BEGIN * of_life or turn > _BEGIN_OF_PATH * of_path
     cycles, way = step.cycles, max(error.grown, _SIZE * min(step.sizes, default=0.0))
     if not (cycles > 0 and way > 0):
         return False
-    whole = (_WHOLE if rule.meshes else _HALF) * tolerance
+    # What the next solve tells better is no reason yet.
+    life, path = error.life - error.newest_cycles, error.path_but_newest
     short_of_life = (error.K + error.contact + error.unknown) / cycles > of_life
-    short_of_path = error.K_place / way > of_path
+    short_of_path = error.K_place / way > _SHORT_OF_PATH * tolerance
     return bool(
-        (rate > forgiven * of_life and short_of_life and error.life / cycles > whole)
-        or (turn > forgiven * of_path and short_of_path and error.path / way > whole)
+        (rate > forgiven * of_life and short_of_life and life / cycles > _WHOLE * tolerance)
+        or (turn > forgiven * of_path and short_of_path and path / way > _WHOLE * tolerance)
         or (rule.meshes == 0 and _has_no_room(last, step))
     )
 
@@ -343,10 +444,8 @@ def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
 def _local(rule: GrowthRule, step: Step) -> tuple[float, float]:
     """Errors of rate and direction at a step by K, as they count for life and path."""
     error = step.error
-    # No bar: a finer mesh may have one, but once.
-    unknown = 1.0 if rule.meshes == 0 else 0.0
-    if error is None or np.isnan(error.rate):
-        return unknown, unknown
+    if error is None or np.isnan(error.rate):  # a finer mesh may have one
+        return 1.0, 1.0
     return TOGETHER * error.rate, error.turn
 
 

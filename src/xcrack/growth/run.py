@@ -200,8 +200,8 @@ def grow(
     Cycles between two steps: `cycles_between`, with the rates at both, so a step costs one
     analysis of all load states and the life of ten steps is good to a few tenths of a per cent.
 
-    Of a tolerance of the life, half is for the steps and four tenths are for K: where the bars of K
-    ask for more, cells become smaller until those of a few stages of the way are as wanted.
+    Of a tolerance of the life, six tenths are for the steps and four for K: where the bars of K ask
+    for more, cells become smaller until those of a few stages of the way are as wanted.
     Steps are controlled by their estimated error (proportional and integral: Gustafsson 1991, ACM
     Trans. Math. Softw. 17, 533).
 
@@ -656,7 +656,8 @@ def _last_step(
     cycles = max((arrival.cycles for arrival in arrivals), default=last.cycles)
     error = last.error
     if error is not None:  # no K has been solved for the last ligament: its cycles count in full
-        error = replace(error, place=none, unknown=error.unknown + cycles - last.cycles)
+        unknown = error.unknown + cycles - last.cycles
+        error = replace(error, place=none, newest_place=(), unknown=unknown)
     return Step(
         index=last.index + 1,
         cycles=max([cycles, *(join.N for join in joins)]),

@@ -50,6 +50,8 @@ class SolveHistory:
         Of the law: a rate close to zero is interpolated as its power 1/exponent.
     kinds : BlockCycles, optional
         Cycles of a block, with retardation.
+    rate_bend : (n,) array, 1/√length, optional
+        Of ln(rate) where the history begins, as `bend` of the direction.
     """
 
     sigma: Floats
@@ -60,6 +62,7 @@ class SolveHistory:
     bend: Floats
     exponent: float
     kinds: BlockCycles | None = None
+    rate_bend: Floats | None = None
 
     @property
     def n_solves(self) -> int:
@@ -151,7 +154,12 @@ def rates_at(solves: SolveHistory, s: Floats, threshold: float = 0.0) -> Floats:
     So powers of the length are exact, and the width of a body enters as it does first in K of
     cracks of length a: as a power series in a² (Isida 1973, in Sih, Mechanics of Fracture 1).
     """
-    rate = _positive(solves, solves.rate, s, solves.exponent)
+    if solves.rate_bend is None:
+        rate = _positive(solves, solves.rate, s, solves.exponent)
+    else:
+        smooth = solves.rate * np.exp(-solves.rate_bend * np.sqrt(solves.sigma[:, None]))
+        rate = _positive(solves, smooth, s, solves.exponent)
+        rate = rate * np.exp(solves.rate_bend * np.sqrt(s[:, None]))
     if threshold > 0:
         rate = np.where(_positive(solves, solves.dK_eq, s, 1.0) < threshold, 0.0, rate)
     return rate

@@ -312,6 +312,11 @@ class StepError:
     behind : float
         Relative error of K by the lengths of cracks whose tips do not drive: how far these are
         ahead of or behind where they should be is known to the length of the steps only.
+    newest_place : tuple of (f,) arrays, length
+        Part of `place` by the last step alone, which the next solve tells better; empty where it
+        does not.
+    newest_cycles : float
+        Likewise of `cycles`.
     """
 
     place: PerCrack
@@ -325,6 +330,8 @@ class StepError:
     rate_contact: float = np.nan
     turn: float = np.nan
     behind: float = 0.0
+    newest_place: PerCrack = ()
+    newest_cycles: float = 0.0
 
     @property
     def life(self) -> float:
@@ -336,6 +343,13 @@ class StepError:
         """Error of the places by all sources, length."""
         steps = max((float(part.max(initial=0.0)) for part in self.place), default=0.0)
         return steps + self.K_place
+
+    @property
+    def path_but_newest(self) -> float:
+        """Error of the places but for what the next solve tells better, length."""
+        newest = self.newest_place or tuple(np.zeros_like(part) for part in self.place)
+        parts = zip(self.place, newest, strict=True)
+        return max((float((a - b).max(initial=0.0)) for a, b in parts), default=0.0) + self.K_place
 
 
 _MADE_BY_GROW = {

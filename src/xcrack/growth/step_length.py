@@ -6,23 +6,32 @@ from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import StepControl
 
 PATH = 0.75  # of it in the path, which K has less in
-STEPS = 0.5  # of the tolerance: what the length of the steps may take
-REJECTED = 2.0  # errors from which on a step is done again with a shorter one
+STEPS = 0.6  # of the tolerance: what the length of the steps may take
+REJECTED = 1.8  # errors from which on a step is done again with a shorter one
 # Of a correction: more than the error that is left, on nearly all scenes, in equal steps and in
 # those of a tolerance, which are fewer and change their length.
 _LEFT, _LEFT_OF_FEW = 0.25, 0.6
 
 _LEAST = 1e-3  # a step without any correction does not ask for an endless next one
 _SAFE = 0.95
-_NOW, _BEFORE = 0.35, 0.15  # exponents of the last error and of the one before
+_NOW, _BEFORE = 0.25, -0.15  # exponents of the last error and of the one before
 _BEGIN = 2.0  # of the crack, times the root of the tolerance: the first step
 _FIRST = 0.5  # exponent after the first step, whose predictor is of first order
-_CHANGE, _FIRST_CHANGE = (0.4, 1.6), (0.5, 1.6)
+_CHANGE, _FIRST_CHANGE = (0.4, 2.0), (0.5, 3.0)
 # Cells of the shortest step: straight on, and more behind a right-angled kink, where K on a shorter
 # face is that of a kink between two cells.
 _STRAIGHT, _KINKED = 0.12, 1.6
-_PAST = 0.05  # of the cycles so far: a step of fewer cycles may err by a share of this many
-_AHEAD = 0.5  # of the way to the boundary ahead: the longest step
+# Of the cycles and of the way so far: a step of less may err by a share of this many.
+PAST, _PAST_WAY = 0.15, 0.2
+# Of the way to the boundary ahead: the longest step, and that times the cube root of the tolerance,
+# as K changes over such a way, and errs by the third power of a step.
+_AHEAD, _AHEAD_OF_FEW = 0.7, 3.2
+_LIGAMENT = 0.2  # of the tolerance: cycles of a last ligament that no K need be known for
+
+
+def cell_for(length: float, turn: float) -> float:
+    """Size of cells that leave room for a step, behind a kink of some angle (rad)."""
+    return length / shortest(1.0, turn)
 
 
 def shortest(cell: float, turn: float) -> float:
@@ -31,7 +40,13 @@ def shortest(cell: float, turn: float) -> float:
 
 
 def step_error(
-    off: float, length: float, off_cycles: float, cycles: float, before: float, tolerance: float
+    off: float,
+    length: float,
+    off_cycles: float,
+    cycles: float,
+    before: float,
+    tolerance: float,
+    way: float = 0.0,
 ) -> float:
     """Error of a step in units of the tolerance, at least a thousandth.
 
@@ -47,9 +62,11 @@ def step_error(
         Cycles before the step.
     tolerance : float
         Of the path, relative to the length grown, and of the life.
+    way : float, length
+        Grown before the step.
     """
-    path = off / (length * tolerance)
-    whole = max(cycles, _PAST * before)
+    path = off / (max(length, _PAST_WAY * way) * tolerance)
+    whole = max(cycles, PAST * before)
     life = off_cycles / (whole * tolerance) if whole > 0 else 0.0
     return float(max(path, life, _LEAST))
 
@@ -111,7 +128,7 @@ def first_control(rule: GrowthRule, size: float, least: float, room: float) -> S
     if rule.tolerance is None:
         return StepControl()
     length = first_length(size, STEPS * rule.tolerance, least)
-    return StepControl(_within(length, room, least), None, least)
+    return StepControl(_within(rule, length, room, least), None, least)
 
 
 def next_control(
@@ -124,6 +141,7 @@ def next_control(
     before: float,
     least: float,
     room: float,
+    way: float = 0.0,
 ) -> StepControl:
     """Length of the step after one whose errors are estimated.
 
@@ -132,7 +150,7 @@ def next_control(
     rule : GrowthRule
     last : StepControl
         Of the step that is done.
-    length, off, off_cycles, cycles, before
+    length, off, off_cycles, cycles, before, way
         As of `step_error`.
     least, room
         As of `first_control`.
@@ -140,23 +158,34 @@ def next_control(
     if rule.tolerance is None:
         return StepControl()
     error = step_error(
-        off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * rule.tolerance
+        off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * rule.tolerance, way
     )
     wanted = next_length(length, error, last.error, least)
-    return StepControl(_within(wanted, room, least), error, least)
+    return StepControl(_within(rule, wanted, room, least), error, least)
 
 
-def _within(length: float, room: float, least: float) -> float:
-    """A length that leaves half of the way to the boundary ahead, but the least at least."""
-    return float(max(min(length, _AHEAD * room), least))
+def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:
+    """Whether the ligament ahead of a tip takes so few cycles that it may leave in one step."""
+    if rule.tolerance is None:
+        return False
+    return room <= _LIGAMENT * rule.tolerance * cycles * rate
+
+
+def _within(rule: GrowthRule, length: float, room: float, least: float) -> float:
+    """A length that leaves some of the way to the boundary ahead, but the least at least."""
+    share = min(_AHEAD, _AHEAD_OF_FEW * (STEPS * float(rule.tolerance or 1.0)) ** (1 / 3))
+    return float(max(min(length, share * room), least))
 
 
 __all__ = [
+    "PAST",
     "PATH",
     "REJECTED",
     "STEPS",
+    "cell_for",
     "first_control",
     "first_length",
+    "leaves",
     "longest",
     "next_control",
     "next_length",

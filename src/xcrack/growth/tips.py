@@ -5,7 +5,7 @@ solved; the parabola through the last three solves then moves the tips once more
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -59,7 +59,15 @@ from xcrack.growth.step import (
     plan_of,
     solves_of,
 )
-from xcrack.growth.step_length import first_control, longest, next_control, share_left, shortest
+from xcrack.growth.step_length import (
+    PAST,
+    first_control,
+    leaves,
+    longest,
+    next_control,
+    share_left,
+    shortest,
+)
 from xcrack.mesh.locate import cell_sizes, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
 
@@ -322,10 +330,10 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
     direction in which the criterion, asked again at the kink, turns no further (`limit_angles`),
     with the rate of the kinked crack. From there its direction changes by
     4 √(2/π) T/K_I* sin θ cos θ √s over the length s (the shear that T adds on the kink, Cotterell
-    and Rice 1980).
+    and Rice 1980); with a tolerance K_I too, by 2 √(2/π) T/K_I* sin² θ √s (the tension on it).
     """
     angle, rate, dK_eq = np.array(rates.angle), np.array(rates.law_rate), np.array(rates.dK_eq)
-    bend = np.zeros(len(rate))
+    bend, rate_bend = np.zeros(len(rate)), np.zeros(len(rate))
     # Of a law with nominal R the rates of a kinked crack are not known, nor a block's direction.
     nominal = getattr(rule.law, "ratio", None) == "nominal"
     known = not (nominal and isinstance(rule.cycle, Spectrum))
@@ -348,7 +356,10 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
             dK_eq[rows] = np.where(kinks, dK, dK_eq[rows])
             shear = ratio * np.sin(begins) * np.cos(begins)
             bend[rows] = np.where(kinks, _COTTERELL_RICE * shear, 0.0)
-    bend *= np.sqrt(rate / rate.max()) if np.isfinite(rate).all() and rate.any() else 0.0
+            opening = ratio * np.sin(begins) ** 2
+            rate_bend[rows] = np.where(kinks, 0.5 * _COTTERELL_RICE * opening, 0.0)
+    slower = np.sqrt(rate / rate.max()) if np.isfinite(rate).all() and rate.any() else 0.0
+    bend, rate_bend = slower * bend, slower * rates.exponent(rule.law) * rate_bend
     direction = replace(rates, angle=angle).direction
     kinds = kinds_of(rule, rates)
     if kinds is not None:  # behind a kink scaled as the range
@@ -363,6 +374,7 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
         bend=bend,
         exponent=rates.exponent(rule.law),
         kinds=kinds,
+        rate_bend=rate_bend if rule.tolerance is not None and rate_bend.any() else None,
     )
 
 
@@ -409,9 +421,16 @@ def _T_over_K(K_I: Floats, T: Floats) -> Floats:
 
 _PASSES = 6  # of the correction, which turns the last face, which turns the direction
 _OF_LENGTH = 0.5  # relative change of K with that of the length of a crack, also of another one
-_FIRST = 0.5  # of that for the first step's cycles, of which no parabola is known yet
-_LEAST_RATIO = 0.2  # of what two parabolas say of a step to what the first of them did
-_MENDED = 0.1  # of that squared and relative: what is left once the second step has mended it
+# Of the first step, until a second one tells better: of its cycles, and of places with retardation.
+_FIRST, _FIRST_OF_PLACE = 0.2, 0.5
+_MENDED = 0.04  # of its correction squared and relative: what is left once the second has mended it
+LONGER_FIRST = 1.5  # times a first step of which no later one mends the cycles
+# What two polynomials say of the step before to what its own said beside a line.
+_RATIOS, _RATIOS_OF_PLACE = (0.1, 1.0), (0.5, 3.0)
+_RATIO_OF_FIRST, _OF_SECOND = 0.9, 0.5  # of cycles of the first two steps, of the second alone
+_RATIO_OF_PROLONGED = 0.25  # a parabola behind the first step errs more in it than its own
+_ASTRAY = 1.0  # of what a face turns by, as the one before it was turned: growth of errors of paths
+_OF_GAP = 0.08  # of a correction: as K was solved where the tip is not
 
 
 def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
@@ -586,25 +605,42 @@ def _corrected(rule: GrowthRule, last: Step, rates: Rates, identities: Identitie
     except GeometryError:  # which the predicted cracks are free of
         x, cracks, moves = stations.x + plan.move, list(rates.cracks), plan.moves
     gap = x - (stations.x + plan.move)
-    off = share_left(rule) * np.linalg.norm(gap, axis=1)
-    if old.n_solves == 1:
-        off *= _FIRST
-    cycles, own, alone = _cycles(rule, last, solves, growth)
-    ahead = share_left(rule) * np.abs((gap * solves.direction[-1]).sum(axis=1))
-    behind = error.behind + float((_OF_LENGTH * ahead / solves.scale).max(initial=0.0))
-    own += solves.exponent * behind * cycles
+    by_places = _places(rule, last, solves, frame, gap)
+    known, newest = by_places.known, by_places.newest
+    cycles, of_life = _cycles(rule, last, solves, growth)
+    lag = _OF_LENGTH * by_places.ahead / solves.scale
+    behind = error.behind + float(lag[0].max(initial=0.0))
+    # What an end lags behind by after this step counts in all cycles that follow.
+    whole = max(growth.cycles, PAST * last.cycles)
+    alone = of_life.alone + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole
+    own = of_life.known + of_life.newest - error.newest_cycles
+    own += solves.exponent * behind * growth.cycles
     after = _stations(cracks, identities, x, stations.fresh | moves)
+    # A tip that is astray turns its next face by a share of that: where T > 0 it goes farther so.
+    astray = 1 + _ASTRAY * np.maximum(gamma, 0.0)
+    off = astray * by_places.off
     control = next_control(
         rule, last.control, plan.length, float(off.max(initial=0.0)), alone, growth.cycles,
-        last.cycles, *_room(rule, after, solves, rates),
+        last.cycles, *_room(rule, after, solves, rates, last.cycles + cycles), plan.sigma,
     )  # fmt: skip
-    place = tuple(a + b for a, b in zip(error.place, rates.split(off), strict=True))
+    before = np.concatenate([np.zeros(0), *error.place])
+    if error.newest_place:
+        before -= np.concatenate(error.newest_place)
+    place = astray * before + known + newest
+    fastest = int(np.argmax(plan.arc))
     return Corrected(
         last.cycles + cycles,
         tuple(cracks),
         after,
         solves,
-        StepError(place, error.cycles + own, behind=behind),
+        StepError(
+            rates.split(place),
+            error.cycles + own,
+            K_place=float(astray[fastest]) * error.K_place,
+            behind=behind,
+            newest_place=rates.split(newest),
+            newest_cycles=of_life.newest,
+        ),
         control,
         stretch.zones,
         last.zones,
@@ -622,60 +658,141 @@ def _first(
 ) -> StepControl:
     """Length of the first step."""
     size = float(solves.scale.min(initial=np.inf))
-    return first_control(rule, size, *_room(rule, stations, solves, rates))
+    return first_control(rule, LONGER_FIRST * size, *_room(rule, stations, solves, rates))
 
 
 def _room(
-    rule: GrowthRule, stations: GrowthStations, solves: SolveHistory, rates: Rates
+    rule: GrowthRule,
+    stations: GrowthStations,
+    solves: SolveHistory,
+    rates: Rates,
+    cycles: float = 0.0,
 ) -> tuple[float, float]:
-    """Shortest step of the fastest tip, and the way to the boundary ahead of it, length."""
+    """Shortest step of the fastest tip, and the way to the boundary ahead of it, length.
+
+    No boundary is ahead where the way to it takes next to none of the cycles so far.
+    """
     if not len(stations):
         return 0.0, np.inf
     tip = int(np.argmax(solves.rate[-1]))
     x, mesh = stations.x[tip], rule.problem.mesh
     hit = exit_ahead(x, solves.direction[-1, tip], mesh)
     room = np.inf if hit is None else float(np.linalg.norm(hit[0] - x))
+    if len(stations) == 1 and leaves(rule, room, float(solves.rate[-1, tip]), cycles):
+        room = np.inf
     return shortest(float(cell_sizes(mesh, x[None])[0]), float(rates.angle[tip])), room
+
+
+@dataclass(frozen=True, eq=False)
+class _PlacesError:
+    """Estimated errors of the tips by a step, in two parts of the errors so far.
+
+    Attributes
+    ----------
+    known, newest : (n,) arrays, length
+        What is known once and for all with it, and what the next solve tells better.
+    off : (n,) array, length
+        Of this step alone.
+    ahead : (2, n) array, length
+        Parts of `known` and of `newest` along the paths.
+    """
+
+    known: Floats
+    newest: Floats
+    off: Floats
+    ahead: Floats
+
+
+def _places(
+    rule: GrowthRule, last: Step, solves: SolveHistory, frame: Floats, gap: Floats
+) -> _PlacesError:
+    """Estimated errors of the tips by a corrected step.
+
+    Notes
+    -----
+    Two polynomials span the step before: that of its own, and that of the solves up to this one.
+    The error is between them. In this step, of which no second one is known yet, it is to the
+    difference from a line as it was in that, and grows with the length.
+    """
+    plan, old = plan_of(last), solves_of(last)[1]
+    along = solves.direction[-1]
+    size, arc = np.linalg.norm(gap, axis=1), np.abs((gap * along).sum(axis=1))
+    none = np.zeros(len(size))
+    if last.zones is not None:
+        share = share_left(rule) * (_FIRST_OF_PLACE if old.n_solves == 1 else 1.0)
+        return _PlacesError(share * size, none, share * size, np.stack([share * arc, none]))
+    by_gap, arc = _OF_GAP * size, _OF_GAP * arc
+    if old.n_solves == 1:
+        return _PlacesError(by_gap, none, by_gap, np.stack([arc, none]))
+
+    def moves(each: SolveHistory, k: int) -> Floats:
+        begins, ends = float(solves.sigma[k - 1]), float(solves.sigma[k])
+        stretch = Stretch(each, begins, ends - begins, rule.threshold)
+        return stretch.growth(frame, each.angles(frame)).move
+
+    now, before = (
+        moves(solves, k) - moves(each, k) for k, each in ((-1, solves.last(2)), (-2, old))
+    )
+    ratio, found = np.ones(len(size)), np.linalg.norm(before, axis=1)
+    if old.n_solves > 2:
+        was = np.linalg.norm(moves(old, -2) - moves(old.last(2), -2), axis=1)
+        longer = plan.length / float(solves.sigma[-2] - solves.sigma[-3])
+        ratio = np.divide(longer * found, was, out=ratio, where=was > 0)
+        ratio = np.clip(ratio, *_RATIOS_OF_PLACE)
+    newest = ratio * np.linalg.norm(now, axis=1)
+    ahead = np.stack([
+        arc + np.abs((before * along).sum(axis=1)), ratio * np.abs((now * along).sum(axis=1))
+    ])  # fmt: skip
+    return _PlacesError(by_gap + found, newest, by_gap + newest, ahead)
+
+
+@dataclass(frozen=True, eq=False)
+class _CyclesError:
+    """Estimated errors of the cycles: of a step alone, and two parts of that so far.
+
+    What is known once and for all with it, and what the next solve tells better.
+    """
+
+    alone: float
+    known: float
+    newest: float
 
 
 def _cycles(
     rule: GrowthRule, last: Step, solves: SolveHistory, growth: Growth
-) -> tuple[float, float, float]:
-    """Cycles of a corrected step, what they add to the estimated error, and that of them alone."""
-    plan, old = plan_of(last), solves_of(last)[1]
+) -> tuple[float, _CyclesError]:
+    """Cycles of a corrected step, and their estimated error."""
+    plan, old, share = plan_of(last), solves_of(last)[1], share_left(rule)
     if old.n_solves == 1:
         off = abs(growth.cycles - plan.cycles)
         # The parabola of the next step mends it: of that, a square is left.
-        rest = _MENDED * share_left(rule) * off**2 / growth.cycles if growth.cycles > 0 else 0.0
-        return growth.cycles, _FIRST * share_left(rule) * off, rest
+        rest = _MENDED * share * off**2 / growth.cycles if growth.cycles > 0 else 0.0
+        return growth.cycles, _CyclesError(rest, 0.0, _FIRST * share * off)
     line = stretch_of(rule, solves.last(2), plan.sigma, plan.length, last.zones).arcs()[1]
-    alone = own = share_left(rule) * abs(growth.cycles - line)
+    own = share * abs(growth.cycles - line)
     if old.n_solves > 2:
-        return growth.cycles, *_better_known(rule, last, solves, own)
+        return growth.cycles, _better_known(rule, last, solves, own)
     if old.sigma[0] > 0:  # the step before has passed an interface
-        return growth.cycles, own, alone
+        return growth.cycles, _CyclesError(own, 0.0, own)
     # The second step: the parabola tells what the first one, along a line, was off.
     span, first = float(old.sigma[1] - old.sigma[0]), float(old.sigma[0])
-    line, curve, constant = (
-        stretch_of(rule, each, first, span, last.earlier_zones).arcs()[1]
-        for each in (old, solves, old.first(1))
+    line, curve = (
+        stretch_of(rule, each, first, span, last.earlier_zones).arcs()[1] for each in (old, solves)
     )
-    own += share_left(rule) * (abs(curve - line) - _FIRST * abs(line - constant))
-    return growth.cycles + curve - line, own, alone
+    both = _RATIO_OF_FIRST * (own + share * abs(curve - line))
+    return growth.cycles + curve - line, _CyclesError(_OF_SECOND * own, 0.0, both)
 
 
-def _better_known(
-    rule: GrowthRule, last: Step, solves: SolveHistory, own: float
-) -> tuple[float, float]:
-    """What a step adds to the estimated error of the cycles, and that of the step alone.
+def _better_known(rule: GrowthRule, last: Step, solves: SolveHistory, own: float) -> _CyclesError:
+    """Errors of the cycles of a step behind the second.
 
     Two parabolas span the step before: that of its own, and that of the step behind it. The error
     is between them, so that their difference takes the place of what was reckoned with then; the
     error of this step, of which no second parabola is known yet, is taken to be smaller likewise.
     """
-    old = solves_of(last)[1]
+    old, before = solves_of(last)[1], _error(last).newest_cycles
     if last.zones is not None:
-        return own, own
+        return _CyclesError(own, own + before, 0.0)
 
     def cycles(each: SolveHistory, k: int) -> float:
         begins, ends = float(old.sigma[k]), float(old.sigma[k + 1])
@@ -683,12 +800,13 @@ def _better_known(
 
     was = share_left(rule) * abs(cycles(old, 1) - cycles(old.last(2), 1))
     now = abs(cycles(old, 1) - cycles(solves, 1))
-    ratio = float(np.clip(now / was, _LEAST_RATIO, 1.0)) if was > 0 else 1.0
-    change = now - was
+    longer = plan_of(last).length / float(old.sigma[2] - old.sigma[1])
+    newest = own * (float(np.clip(longer * now / was, *_RATIOS)) if was > 0 else 1.0)
     if old.sigma[0] == 0:  # the first step of all is spanned by one parabola: the next is prolonged
-        was = share_left(rule) * abs(cycles(old, 0) - cycles(old.first(2), 0))
-        change += min(abs(cycles(old, 0) - cycles(solves, 0)), was) - was
-    return change + own, ratio * own
+        was = abs(cycles(old, 0) - cycles(old.first(2), 0))
+        prolonged = abs(cycles(old, 0) - cycles(solves, 0))
+        now += min(_RATIO_OF_PROLONGED * prolonged, _RATIO_OF_FIRST * share_left(rule) * was)
+    return _CyclesError(newest, now, newest)
 
 
 def _begins(last: Step, plan: Plan) -> Floats:
@@ -788,6 +906,7 @@ def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None)
 
 
 __all__ = [
+    "LONGER_FIRST",
     "advance_of",
     "begin",
     "correct",

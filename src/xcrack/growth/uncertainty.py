@@ -18,7 +18,7 @@ from xcrack.sif.sif import SIF, bars_of
 # Of the sum of all steps with one sign: each bar holds for almost all single K, and what they err
 # by cancels in part. On fifteen uniform meshes (five scenes) lives erred by a quarter of the sum.
 TOGETHER = 0.5
-_ASTRAY = 2.0  # times the turn of a step: where T > 0 a crack that is astray goes on to be so
+_ASTRAY = 2.0  # times the turn of a step, where no integrator says how such errors go on
 _FAST = 0.5  # of the largest rate: places that count for the error of life
 _REMEDY = {
     "steps": "The first step is known better once a second one is done; later ones are as short as "
@@ -171,6 +171,9 @@ def add_K_error(
         both, parts = [before.rate, now.rate], [before.rate_contact, now.contact]
         turns = [turn for turn in (before.turn, now.turn) if np.isfinite(turn)]
         way = max((float(da.max(initial=0.0)) for da in last.da), default=0.0)
+        # Of 2D tips it is known how errors of before have grown.
+        grown = corrected.error.K_place
+        K_place, share = (before.K_place, _ASTRAY) if np.isnan(grown) else (grown, 1.0)
         of_K = [rate - part for rate, part in zip(both, parts) if np.isfinite(rate)]
         of_contact = [part for rate, part in zip(both, parts) if np.isfinite(rate)]
         error = replace(
@@ -178,7 +181,7 @@ def add_K_error(
             K=before.K + TOGETHER * 0.5 * cycles * sum(of_K),
             contact=before.contact + 0.5 * cycles * sum(of_contact),
             unknown=before.unknown + 0.5 * cycles * (2 - len(of_K)),
-            K_place=before.K_place + _ASTRAY * way * float(np.mean(turns) if turns else 0.0),
+            K_place=K_place + share * way * float(np.mean(turns) if turns else 0.0),
             grown=before.grown + way,
         )
     return replace(

@@ -335,9 +335,11 @@ def arrays_of(step: Step) -> Arrays:
     result |= pack("zones", step.zones)
     result |= pack("earlier_zones", step.earlier_zones)
     result |= pack("control", step.control)
-    result |= pack("error", step.error, ("place",))
+    result |= pack("error", step.error, ("place", "newest_place"))
     if step.error is not None:
         result["error_place"] = np.concatenate([np.zeros(0), *step.error.place])
+        if step.error.newest_place:
+            result["error_newest_place"] = np.concatenate(step.error.newest_place)
     if step.plan is not None:
         result |= pack("plan", step.plan, ("cracks", "apart", "joins"))
         result |= pack_rows("plan_join", step.plan.joins)
@@ -399,7 +401,8 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
         )
     error = None
     if "error_place" in arrays:
-        error = unpack(StepError, "error", arrays, place=per_crack("error_place"))
+        places = {name: per_crack(f"error_{name}") for name in ("place", "newest_place")}
+        error = unpack(StepError, "error", arrays, **places)
     identities = None
     if "identity_crack" in arrays:
         ends = split(arrays["identity_end"], arrays["identity_end_count"].tolist())
