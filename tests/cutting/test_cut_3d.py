@@ -110,6 +110,31 @@ def check_cut(built, area=None):
         assert result == pytest.approx(area, rel=1e-9)  # snapping moves a cut by 1e-10 of a cell
 
 
+def test_faces_of_a_cap_lie_on_it_in_the_mean():
+    """Where φ is interpolated, they lie 0.020 on its hollow side (cells of 0.5)."""
+    points, triangles, centre = scenes.cap(24)
+    built = model(
+        xc.box((-2.5, -2.5, -2), (2.5, 2.5, 2), (10, 10, 8)), xc.surface_crack(points, triangles)
+    )
+    check_cut(built)
+    lips = built.lips[0]
+    offset = np.linalg.norm(lips.x - centre, axis=1) - 2.0
+    mean = (lips.weight * offset).sum() / lips.weight.sum()
+    print(f"mean {mean:.5f}, largest {np.abs(offset).max():.5f}")
+    assert abs(mean) <= 1.5e-3
+
+
+def test_planes_are_not_shifted():
+    """No bit of φ of a plane crack changes, turned and on a perturbed mesh."""
+    built = model(scenes.perturbed(4, 31), scenes.half_sheet(0.1, 0.03, 0.2))
+    levels, mesh = built.space.cuts[0].level_set, built.space.mesh
+    a, b, c = built.space.cracks[0].points[built.space.cracks[0].faces[0]]
+    normal = np.cross(b - a, c - a)
+    distance = (mesh.points - a) @ normal / np.linalg.norm(normal)
+    near = np.abs(levels.phi) < 0.5
+    np.testing.assert_allclose(levels.phi[near], distance[near], atol=1e-14)  # round-off
+
+
 @settings(max_examples=15, deadline=None)
 @given(
     normal=st.tuples(*[st.integers(-9, 9)] * 3).filter(any),

@@ -106,3 +106,20 @@ def opening(solution, crack=0):
     lips = solution.lips[crack]
     jump = jump_matrix(solution.space, crack, lips) @ solution.u
     return float(lips.weight @ jump), float(lips.weight @ jump**2)
+
+
+def cap(rings, radius=2.0, angle=np.pi / 4, middle=(0.011, -0.007, 0.019)):
+    """Points, triangles and centre of a spherical cap; the middle of its rim is given."""
+    points, triangles = [(0.0, 0.0, radius)], []
+    for i in range(1, rings + 1):
+        t, s = angle * i / rings, np.pi * np.arange(6 * i) / (3 * i)
+        ring = [np.sin(t) * np.cos(s), np.sin(t) * np.sin(s), np.cos(t) + 0 * s]
+        points += (radius * np.transpose(ring)).tolist()
+        outer, inner = 1 + 3 * i * (i - 1), 1 + 3 * (i - 1) * (i - 2) if i > 1 else 0
+        for sector in range(6):
+            for j in range(i):
+                a, b = (outer + (sector * i + j + k) % (6 * i) for k in (0, 1))
+                c, d = (inner + (sector * (i - 1) + j + k) % max(1, 6 * (i - 1)) for k in (0, 1))
+                triangles += [(a, b, c), (b, d, c)][: 2 if j < i - 1 else 1]
+    centre = np.array(middle) - (0, 0, radius * np.cos(angle))
+    return np.array(points) + centre, np.array(triangles), centre

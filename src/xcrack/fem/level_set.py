@@ -9,10 +9,11 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.placing_2d import ON_MESH
-from xcrack.mesh.distances import front_distance, surface_distance
+from xcrack.mesh.distances import TriangleTree, front_distance, signed_in, triangle_tree
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
 from xcrack.mesh.polygon import boxes_meet
+from xcrack.mesh.simplex import simplex_rule
 from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
 
 SNAP = 1e-10  # share of an edge below which a cut point is moved onto its end
@@ -25,7 +26,8 @@ class LevelSet:
     Attributes
     ----------
     phi : (n,) array, length
-        Signed distance, positive on the side of lip +, zero where snapped.
+        Signed distance, positive on the side of lip +, zero where snapped; in 3D shifted so that
+        what is linear in cells follows a curved crack in the mean.
     psi : (f, n) array, length
         Signed distance to each tip along the crack; the crack is where all are negative.
     tip_cells : tuple of (k,) arrays of int
@@ -69,10 +71,21 @@ def level_set(mesh: Mesh, crack: Crack, reach: float) -> "LevelSet":
     return line_levels(mesh, crack) if mesh.dim == 2 else surface_levels(mesh, crack, reach)
 
 
-def near_edges(mesh: Mesh, phi: Floats) -> Bools:
-    """Edges short enough to be crossed where phi changes its sign `(e,)`."""
+def near_edges(mesh: Mesh, phi: Floats, shift: Floats | None = None) -> Bools:
+    """Edges short enough to be crossed where phi changes its sign `(e,)`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    phi : (n,) array, length
+    shift : (n,) array, length, optional
+        What phi has more than a distance, which changes by no more than the length of an edge.
+    """
     ends = np.abs(phi)[mesh.edges]
-    return np.asarray(ends[:, 0] + ends[:, 1] <= mesh.edge_length * (1 + 1e-6))
+    most = mesh.edge_length * (1 + 1e-6)
+    if shift is not None:
+        most = most + np.abs(np.diff(shift[mesh.edges], axis=1)[:, 0])
+    return np.asarray(ends[:, 0] + ends[:, 1] <= most)
 
 
 def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
@@ -296,8 +309,10 @@ def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Int
 
 _FLAT = 0.03  # share |psi| / r below which the root of r² - phi² loses digits
 _AT = 1e-10  # share of a cell below which a psi on the crack is zero
-_STRAIGHT = 1e-6  # offset of the chords, as a share of a cell, below which a front is straight
+_STRAIGHT = 1e-6  # offset as a share of a cell, below which a front or a surface is straight
 _CHORDS = 12  # chords over which their offset is averaged
+_NO_CUT = 0.5  # error of phi as a share of a cell, from which on that is not cut by the crack
+_PASSES = 12  # towards the mean square: leaves a thirtieth of the slowest part
 
 
 def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
@@ -318,18 +333,20 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     size = _largest_cells(mesh, crack)
     band = reach + 2 * size
     surface = extended_surface(crack, mesh, band + size)
-    phi, triangle, at_end = surface_distance(mesh.points, surface.points, surface.triangles, band)
+    tree = triangle_tree(surface.points, surface.triangles)
+    phi, triangle, at_end = signed_in(tree, mesh.points, band)
     label = np.where(triangle >= 0, surface.label[triangle], 0)
     fronts = front_frames(crack)
     far_distance = 10 * mesh.extent
     psi = np.empty((len(fronts), mesh.n_points))
     for k, front in enumerate(fronts):
         psi[k] = _front_distance(mesh.points, phi, label == k + 1, front, band, far_distance)
-    phi = snap_to_vertices(mesh, phi)
-    near_edge = near_edges(mesh, phi)
+    mouth = np.where(at_end & (label == 0), np.abs(phi), -far_distance)
+    shift = _surface_shift(mesh, phi, at_end, tree)
+    phi = snap_to_vertices(mesh, phi + shift)
+    near_edge = near_edges(mesh, phi, shift)
     for k, front in enumerate(fronts):
         psi[k] = _shifted_psi(mesh, phi, psi[k], near_edge, front, band)
-    mouth = np.where(at_end & (label == 0), np.abs(phi), -far_distance)
     tip_cells = tuple(_front_cells(mesh, phi, p, near_edge) for p in psi)
     one = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(one), lock(mouth), lock(near_edge))
@@ -352,7 +369,7 @@ def with_far_sides(mesh: Mesh, crack: Crack, levels: "LevelSet", reach: float) -
     if not len(far):
         return levels
     surface = extended_surface(crack, mesh, band + size)
-    distance = surface_distance(mesh.points[far], surface.points, surface.triangles)[0]
+    distance = signed_in(triangle_tree(surface.points, surface.triangles), mesh.points[far])[0]
     phi = np.array(levels.phi)
     phi[far] = np.copysign(phi[far], distance)
     return replace(levels, phi=lock(phi))
@@ -411,6 +428,49 @@ def _shifted_psi(
     shifted = psi.copy()
     shifted[rows] += (share * offset[nearest]).sum(axis=1) / share.sum(axis=1)
     return shifted
+
+
+def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -> Floats:
+    """What to add to phi so that it is the distance in the mean square over the cut cells `(n,)`.
+
+    In a cell the surface is flat: interpolated, all pieces of a curved one lie on its hollow side,
+    by a twelfth of h² over the radius, and are turned at the front, beyond which the surface goes
+    on straight. K, which is taken around the true front, was 3 % off on a cap with 2.5 cells in
+    the radius of its rim. In the mean the best linear function in cells lies on the surface.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    phi : (n,) array, length
+        Distance to the surface and its prolongation.
+    at_end : (n,) array of bool
+        Points beyond its ends, where no cell is cut.
+    tree : TriangleTree
+        The surface and its prolongation.
+    """
+    values = phi[mesh.cells]
+    cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0) & ~at_end[mesh.cells].any(axis=1)
+    cells = np.nonzero(cut)[0]
+    bary, weight = simplex_rule(3, 2)
+    x = np.einsum("pv,cvd->cpd", bary, mesh.points[mesh.cells[cells]]).reshape(-1, 3)
+    found = signed_in(tree, x)
+    distance, _, beyond = (a.reshape(len(cells), len(weight)) for a in found)
+    error = distance - values[cells] @ bary.T
+    size = mesh.cell_size[cells]
+    of_crack = (np.abs(error).max(axis=1) < _NO_CUT * size) & ~beyond.any(axis=1)
+    cells, error, size = cells[of_crack], error[of_crack], size[of_crack]
+    shift = np.zeros(mesh.n_points)
+    if np.abs(error).max(initial=0.0) < _STRAIGHT * size.min(initial=np.inf):
+        return shift
+    nodes, volume = mesh.cells[cells], mesh.volume[cells]
+    load = np.einsum("c,p,pi,cp->ci", volume, weight, bary, error).ravel()
+    lumped = np.bincount(nodes.ravel(), np.repeat(volume / 4, 4), mesh.n_points)
+    lumped[lumped == 0] = 1.0
+    # Of the mass matrix over its lumped one all eigenvalues lie between a fifth and one.
+    for _ in range(_PASSES):
+        product = (volume / 20)[:, None] * (shift[nodes] + shift[nodes].sum(axis=1, keepdims=True))
+        shift += 1.25 * np.bincount(nodes.ravel(), load - product.ravel(), mesh.n_points) / lumped
+    return shift
 
 
 def _chords(mesh: Mesh, phi: Floats, psi: Floats, cells: Ints) -> tuple[Floats, Floats]:
