@@ -25,7 +25,7 @@ _GROWS = 0.3  # by which cells grow with the distance from where they are smalle
 _HALF = 0.5  # of a cell, where nothing is estimated
 # Of the change of both modes of K to the second solution: what is added, as squares are, where that
 # has a bar of its own; of the largest change of a crack, least half-width where it has none.
-_ADDED, _LEAST = 0.03, 0.5
+_ADDED, _LEAST = 0.01, 0.75
 # Reasons that smaller cells do not take away, and that the change of K does not show.
 _STAYS = (
     "order 1", "contact by", "the faces press at the kink",
