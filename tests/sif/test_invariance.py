@@ -37,9 +37,9 @@ def test_cover_of_edges_does_not_hang_on_numbers():
     """Of edges as long as each other but for round-off, the first along the crack is removed."""
     pairs = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
     length, place = np.ones(4), np.array([0.1, 0.2, 0.3, 0.4])
-    kept = vital_edges(pairs, length, place)
+    cover = vital_edges(pairs, length, place)
     for k in range(4):
         changed = length + 1e-12 * (np.arange(4) == k)
-        assert vital_edges(pairs, changed, place).tolist() == kept.tolist()
+        assert vital_edges(pairs, changed, place).tolist() == cover.tolist()
     number = np.array([2, 0, 3, 1])
-    assert vital_edges(number[pairs], length, place).tolist() == kept.tolist()
+    assert vital_edges(number[pairs], length, place).tolist() == cover.tolist()

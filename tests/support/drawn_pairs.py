@@ -135,7 +135,7 @@ def refined_there(mesh, message):
     )
 
 
-def solved_as_told(cracks):
+def solution_after_remedies(cracks):
     """Solution and K, or a refusal, after the remedies of messages; and which those were."""
     mesh, done = xc.box((-1,) * 3, (1,) * 3, CELLS), []
     while True:
@@ -162,7 +162,7 @@ def pair_row(seed):
     kind = kind_of(one, other)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        solution, K, done = solved_as_told(given_as(kind, one, other))
+        solution, K, done = solution_after_remedies(given_as(kind, one, other))
     messages = sorted({str(w.message).split(":", 1)[-1] for w in caught})
     plain = 0.5 * PULL**2 * 3 * (1 - 2 * NU) / E * 8
     least = 8 * (1 - NU**2) * PULL**2 * radius**3 / (3 * E)

@@ -79,8 +79,8 @@ def finer_solutions(solutions: Sequence[Solution], places: Places) -> list[Solut
     factored = solutions[0].factored
     key = ("finer", tuple(s.number for s in solutions), places.x.tobytes(), places.size.tobytes())
     if factored is not None and key in factored.around_tips:
-        found: list[Solution] = factored.around_tips[key]
-        return found
+        refined_solutions: list[Solution] = factored.around_tips[key]
+        return refined_solutions
     problem = solutions[0].problem
     scene = replace(problem, mesh=refine(problem.mesh, size=places.size_at), order=2)
     result = solve_states(scene, [s.state for s in solutions], error=True)
