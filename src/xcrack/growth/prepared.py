@@ -330,8 +330,13 @@ def _shortened(last: Step, step: Step) -> Step | None:
 
 
 def _ends_soon(rule: GrowthRule, step: Step) -> bool:
-    """Whether so little of the life is left to the last tip that no scout is worth its time."""
+    """Whether so little of the life is left to the last tip that no scout is worth its time.
+
+    Not where cells are too coarse for steps of `da`: the run would end there.
+    """
     if rule.problem.mesh.dim == 3 or step.n_tips != 1 or not step.cycles > 0:
+        return False
+    if rule.da is not None and rule.da < step.control.least:
         return False
     stations, solves = solves_of(step)
     hit = exit_ahead(stations.x[0], solves.direction[-1, 0], rule.problem.mesh)
