@@ -138,6 +138,32 @@ def test_life_of_a_penny():
     assert history.life_bar.relative <= 0.1
 
 
+def two_sheets():
+    """Cracks through a slab of three cells whose fronts head for each other."""
+    cracks = [
+        xc.plane_crack([(a, -0.6, 0.013), (b, -0.6, 0.013), (b, 0.6, 0.013), (a, 0.6, 0.013)])
+        for a, b in ((-0.5, -0.2), (0.2, 0.5))
+    ]
+    pull = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+    mesh = xc.box((-1.5, -0.25, -1.0), (1.5, 0.25, 1.0), (18, 3, 12))
+    return xc.Problem(mesh, xc.Isotropic(210e3, 0.3), cracks, loads=pull, contact="off")
+
+
+@pytest.mark.slow
+def test_a_tolerance_over_a_meeting_in_space():
+    """The scout goes through it, on the mesh of which the run goes on; no life is compared."""
+    history = xc.collect(
+        xc.grow(**run_of(two_sheets(), tolerance=0.04)),
+        until=lambda step: len(step.cracks) == 1 and not step.joins,
+    )
+    assert [len(step.cracks) for step in history.steps] == [2, 2, 1, 1]
+    assert len(meshes_of(history)) == 2
+    assert all(np.isfinite(sif.K).all() for step in history.steps for sif in step.sif[-1])
+    met = history.steps[2]
+    assert met.joins
+    assert met.error.life >= history.steps[1].error.life
+
+
 # Meshes ----------------------------------------------------------------------------------------
 
 

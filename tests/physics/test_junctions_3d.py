@@ -351,7 +351,7 @@ BAD = {
         "does not reach|wholly beyond",
     ),
     "along it": ([ONE, xc.arm(xc.penny_crack((0, 0, 0.03), (0.05, 0, 1), 0.4), 0, 1)],
-        "15 degrees|Leave this arm out"),
+        "10 degrees|Leave this arm out"),
     "touches along an edge": ([ONE, upright(0.017)], "let one of them end on the other"),
     "lies in it over an area": (
         [ONE, xc.penny_crack((0.013, 0.0, 0.017), (0, 0, 1), 0.35)],

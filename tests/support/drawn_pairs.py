@@ -200,10 +200,11 @@ def growing_row(seed):
                 break
             if met is None and steps[-1].joins:
                 met = len(steps)
-    if ended and met is None:
-        raise GeometryError(ended.split(", N = 0: ")[-1])
-    words = "met and gone on" if met is not None else "not met in six steps"
-    if ended:
+    is_whole = ended.startswith("max_steps")
+    if ended and met is None and not is_whole:
+        raise GeometryError(ended.split(", N = ")[-1].partition(": ")[2] or ended)
+    words = "met and gone on" if met is not None else f"not met in {MOST_STEPS} steps"
+    if ended and not is_whole:
         words = f"met, then ended: {ended}"
     off = unbalanced(steps, E, NU)
     K = np.concatenate([sif.K.ravel() for step in steps for own in step.sif for sif in own])

@@ -329,6 +329,56 @@ def led_through(
     return replace(grown, ends_on=(*cracks[c].ends_on, (on, side)))
 
 
+def with_room(
+    cracks: Sequence[Crack], c: int, on: int, body: Body, room: float, size: float
+) -> Crack:
+    """The crack on which crack c ends, its fronts led on where that one comes too near to them.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        With fronts, placed.
+    c, on : int
+    body : Body
+    room : float
+        In cells, that is to lie between the front and what ends before it.
+    size : float
+        Of the sides of the new front, in cells.
+
+    Returns
+    -------
+    Crack
+        Not placed again; the same one where there is room.
+    """
+    x = np.concatenate([cracks[c].points[front] for front in cracks[c].fronts or ()])
+    x = x[body.contains(x)]
+    x = x[is_before(cracks, c, x)]
+    fronts = front_frames(cracks[on])
+    s, number, da, cells = [], [], [], []
+    for f, front in enumerate(fronts):
+        cell = body.cell_size(front.x)
+        ahead, height, along = np.moveaxis(
+            np.einsum("mij,mkj->mki", front.frame, x[None] - front.x[:, None]), 2, 0
+        )
+        wanted = room * cell[:, None]
+        # A parabola twice as wide as it is high: the front that is led on stays smooth.
+        lead = ahead + wanted - along**2 / (4 * wanted)
+        lead[(np.abs(height) > wanted) | (np.abs(along) > 2 * wanted)] = 0.0
+        is_inside = body.contains(front.x)
+        s.append(front.s)
+        number.append(np.full(len(front.x), f))
+        da.append(np.where(is_inside, lead.max(axis=1, initial=0.0), 0.0))
+        cells.append(cell)
+    ways = np.concatenate(da)
+    if not ways.any():
+        return cracks[on]
+    spacing = size * float(np.concatenate(cells)[ways > 0].mean())
+    grown = advance_fronts(
+        cracks[on], np.concatenate(s), np.concatenate(number), 0 * ways, ways, spacing
+    )
+    return replace(grown, ends_on=cracks[on].ends_on)
+
+
 def crossings(one: Crack, other: Crack) -> Floats:
     """Points at which edges of either surface cross the other one `(n, 3)`."""
     parts = [np.zeros((0, 3))]
@@ -357,4 +407,5 @@ __all__ = [
     "may_touch",
     "renumbered_arms",
     "surface_junctions",
+    "with_room",
 ]

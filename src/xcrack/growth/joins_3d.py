@@ -18,6 +18,7 @@ from xcrack.crack.junctions_3d import (
     led_through,
     may_touch,
     renumbered_arms,
+    with_room,
 )
 from xcrack.crack.measures import crack_size
 from xcrack.crack.merging import (
@@ -32,7 +33,7 @@ from xcrack.crack.merging import (
     with_own_gap_closed,
     without_inner_front,
 )
-from xcrack.crack.placing_3d import meeting_points, place_arm
+from xcrack.crack.placing_3d import meeting_points, place_arm, place_arms
 from xcrack.growth import euler, fronts
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import interpolate_along_front
@@ -50,6 +51,7 @@ _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be
 _WIDER = 0.75  # of a gap: the disc is as large where a step leads across
 _STEEP = 0.5  # of the height of a step of a cell or more: the gap over which it leads
 _AHEAD = 1.8  # legs of cells before a face in which no front can be solved: it is led through
+_ROOM = 0.75  # cells between an arm and the front of the crack on which it ends: less breaks
 _LEFT = 0.25  # of a cell: the gap that is closed at once
 _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined front
 _SPACING = 0.5  # of a cell, between the points of a new front
@@ -64,7 +66,8 @@ _INTEGRATORS = {"euler": euler, "pec": fronts}
 def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     """A plan in which cracks that meet within its advance are joined.
 
-    The advance ends where the first two fronts are a quarter of a cell apart, which is closed.
+    The advance ends where the first two fronts are a quarter of a cell apart, which is closed. What
+    ends on a face close to the front of that crack breaks the ligament: that front is led on.
 
     Parameters
     ----------
@@ -108,6 +111,10 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
             continue
         now[met.crack] = led_through(now, met.crack, met.on, body, _AHEAD, _SPACING)
         now[met.crack] = place_arm(now, met.crack, rule.problem.mesh)
+        host = with_room(now, met.crack, met.on, body, _ROOM, _SPACING)
+        if host is not now[met.on]:
+            now[met.on] = host
+            now = place_arms(now, rule.problem.mesh)
         joins.append(Join(step.index + 1, step.cycles + cycles, tuple(met.x.tolist()), pair))
     number = list(range(len(now)))
     while pairs := _close(now, body):
