@@ -143,7 +143,7 @@ for step, color in zip(history.steps, colors, strict=True):
 for join in history.joins:
     above.plot(join.point[0], min(-join.point[1], 0.0), "o", color="tab:red", ms=5)
 above.axhline(0, color="k", lw=1)
-above.set(aspect="equal", ylabel="depth in mm", ylim=(-2.8, 0.2))
+above.set(aspect="equal", ylabel="depth in mm", ylim=(-3.5, 0.2))
 above.legend(title="thousand cycles", ncols=8, loc="lower center", fontsize="small", frameon=False)
 below.set(xlabel="x along the toe in mm", ylabel=r"$K_I$ in MPa$\sqrt{\mathrm{mm}}$")
 figure.savefig(OUT / "fronts.png", dpi=120)

@@ -28,9 +28,9 @@ PAGE = ROOT / "docs" / "validation.md"
 HEAD = """# Predicted and measured
 
 ```sh
-python -m xcrack validate --quick               # tests in the plane, coarse cells, long steps: 43 s
-python -m xcrack validate -o validation.html    # all tests, as a page; goes on where it stopped
-python -m xcrack validate -k wagner             # tests with this in their name
+python -m xcrack validate --quick               # in the plane, coarse, long steps: 43 s
+python -m xcrack validate -o validation.html    # all, as a page; goes on where it stopped
+python -m xcrack validate -k wagner             # those with this in their name
 python -m xcrack validate --data folder         # with measured numbers that are not free
 ```
 """
