@@ -241,7 +241,7 @@ def growth_steps(
     if rule.estimates:
         rule = prepared(rule, growth_steps, done, meshes)
     notices, progress = WarningLog(), Progress(rule)
-    kink, is_torn = "", False
+    kink, is_torn = "", any(_alarm_of_segments(rule, step) for step in done)
     try:
         if last is None:
             with notices.watch(0) as messages:
@@ -696,13 +696,20 @@ _OF_LARGEST = 0.1  # K_I below this share of the largest of a front compares wit
 
 
 def _warn_of_mode_III(rule: GrowthRule, step: Step) -> bool:
-    """Warn where a front is unstable under K_III, and would break into segments.
+    alarm = _alarm_of_segments(rule, step)
+    if alarm:
+        warn(alarm)
+    return bool(alarm)
+
+
+def _alarm_of_segments(rule: GrowthRule, step: Step) -> str:
+    """What to say where a front is unstable under K_III, and would break into segments, or "".
 
     Above |K_III| / K_I = √((1 - nu)(2 - 3 nu) / (3 (2 - nu) - 4 √2 (1 - 2 nu))) a straight front is
     unstable (Leblond, Karma and Lazarus, 2011); below nu of -.04 it never is.
     """
     if rule.problem.mesh.dim == 2:
-        return False
+        return ""
     nu = rule.problem.elasticity.poisson
     growth = 3 * (2 - nu) - 4 * sqrt(2) * (1 - 2 * nu)
     limit = sqrt((1 - nu) * (2 - 3 * nu) / growth) if growth > 0 else inf
@@ -713,14 +720,13 @@ def _warn_of_mode_III(rule: GrowthRule, step: Step) -> bool:
         ratio = np.divide(K_III, K_I, out=np.zeros_like(K_I), where=counts)
         if ratio.max(initial=0.0) > limit:
             state, place = np.unravel_index(np.argmax(ratio), ratio.shape)
-            warn(
+            return (
                 f"crack {c}: |K_III| is {ratio[state, place]:.2g} K_I at "
                 f"{np.round(states[0].x[place], 6).tolist()}. Above {limit:.2g} a front breaks "
                 "into segments that turn out of its surface; xcrack grows it as one, and its rate "
                 "is a guess there."
             )
-            return True
-    return False
+    return ""
 
 
 def _warn_of_ratio(rule: GrowthRule, first: Step) -> None:
