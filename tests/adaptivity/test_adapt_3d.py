@@ -176,8 +176,8 @@ def state(*sifs, pressed=(), beside=None):
     """What a round has measured, as far as the next mesh asks for it."""
     best, bar = values([sifs], [0], beside or (0.0,) * len(sifs))
     return SimpleNamespace(
-        sifs=[sifs], solutions=[SimpleNamespace(at_rest=False)], best=best, bar=bar,
-        pressed=pressed, beside=beside or (0.0,) * len(sifs), scale=np.abs(best).max(),
+        sifs=[sifs], solutions=[SimpleNamespace(at_rest=False)], K=best, bar=bar,
+        pressed=pressed, surface_depths=beside or (0.0,) * len(sifs), scale=np.abs(best).max(),
     )  # fmt: skip
 
 
