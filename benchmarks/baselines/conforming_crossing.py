@@ -132,8 +132,8 @@ def solution(grading: Grading, has_small: bool = True) -> tuple[Any, Floats, flo
     x = basis.doflocs[:, ::3]
     free_large = (x[2] < 1e-9) & (np.hypot(x[0], x[1]) < LARGE * (1 - 1e-9))
     free_small = (x[0] < 1e-9) & (np.hypot(x[1], x[2]) < SMALL * (1 - 1e-9)) & has_small
-    is_held = [(x[0] < 1e-9) & ~free_small, x[1] < 1e-9, (x[2] < 1e-9) & ~free_large]
-    known = np.concatenate([3 * np.nonzero(part)[0] + axis for axis, part in enumerate(is_held)])
+    at_rest = [(x[0] < 1e-9) & ~free_small, x[1] < 1e-9, (x[2] < 1e-9) & ~free_large]
+    known = np.concatenate([3 * np.nonzero(part)[0] + axis for axis, part in enumerate(at_rest)])
     u = solved(K, load, known, x.T)
     return basis, u, 8 * 0.5 * float(load @ u)
 

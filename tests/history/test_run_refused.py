@@ -96,7 +96,7 @@ def test_a_folder_that_vanishes_while_a_run_writes_to_it(tmp_path):
         (lambda: "steps", {}, "give what grow returns"),
         (lambda: [1, 2], {}, "1 is not a Step"),
         (lambda: run_of()["problem"], {}, "give what grow returns"),
-        (lambda: grow(**run_of()), {"until": 3}, "until = 3 cannot be called"),
+        (lambda: grow(**run_of()), {"until": 3}, "until = 3: give a function of a Step"),
         (lambda: grow(**run_of()), {"overwrite": "no"}, "overwrite = 'no': give True or False"),
         (lambda: grow(**run_of()), {"keep_solutions": 1}, "keep_solutions = 1: give True"),
     ],

@@ -453,8 +453,8 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
     cells = np.nonzero(cut)[0]
     bary, weight = simplex_rule(3, 2)
     x = np.einsum("pv,cvd->cpd", bary, mesh.points[mesh.cells[cells]]).reshape(-1, 3)
-    found = signed_in(tree, x)
-    distance, _, beyond = (a.reshape(len(cells), len(weight)) for a in found)
+    distances = signed_in(tree, x)
+    distance, _, beyond = (a.reshape(len(cells), len(weight)) for a in distances)
     error = distance - values[cells] @ bary.T
     size = mesh.cell_size[cells]
     of_crack = (np.abs(error).max(axis=1) < _NO_CUT * size) & ~beyond.any(axis=1)

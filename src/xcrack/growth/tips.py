@@ -733,17 +733,17 @@ def _places(
     now, before = (
         moves(solves, k) - moves(each, k) for k, each in ((-1, solves.last(2)), (-2, old))
     )
-    ratio, found = np.ones(len(size)), np.linalg.norm(before, axis=1)
+    ratio, move_length = np.ones(len(size)), np.linalg.norm(before, axis=1)
     if old.n_solves > 2:
         was = np.linalg.norm(moves(old, -2) - moves(old.last(2), -2), axis=1)
         longer = plan.length / float(solves.sigma[-2] - solves.sigma[-3])
-        ratio = np.divide(longer * found, was, out=ratio, where=was > 0)
+        ratio = np.divide(longer * move_length, was, out=ratio, where=was > 0)
         ratio = np.clip(ratio, *_RATIOS_OF_PLACE)
     newest = ratio * np.linalg.norm(now, axis=1)
     ahead = np.stack([
         arc + np.abs((before * along).sum(axis=1)), ratio * np.abs((now * along).sum(axis=1))
     ])  # fmt: skip
-    return _PlacesError(by_gap + found, newest, by_gap + newest, ahead)
+    return _PlacesError(by_gap + move_length, newest, by_gap + newest, ahead)
 
 
 @dataclass(frozen=True, eq=False)
