@@ -31,7 +31,6 @@ from xcrack.fatigue.law import GrowthLaw, Law
 from xcrack.fatigue.law_sets import LawSets
 from xcrack.fatigue.retardation import RetardationSets
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.fatigue.tables import rate_table
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options
 from xcrack.mesh.fields import Field, read_field, write_field
 from xcrack.mesh.files import write_mesh
@@ -297,12 +296,7 @@ class _Writing:
         kind = type(value)
         if makers is None:
             makers = {kind.__name__: kind}
-        names = [name for name, maker in makers.items() if maker is kind]
-        if isinstance(value, rate_table):
-            keys = ("R", "dK", "rate")
-            curves = [dict(zip(keys, curve, strict=True)) for curve in value.curves]
-            own = {name: v for name, v in self._fields(value, what).items() if name != "curves"}
-            return {"kind": "rate_table", "curves": self._plain(curves, what), **own}
+        names = [name for name, maker in makers.items() if maker is kind or name == kind.__name__]
         if not names:
             is_function = callable(value) and not isinstance(value, GrowthLaw)
             self._refuse(what, "function" if is_function else "class")
@@ -329,6 +323,8 @@ class _Writing:
             return value.tolist()
         if isinstance(value, bool | int | float | str):
             return value
+        if isinstance(value, tuple) and hasattr(value, "_asdict"):  # a curve of a rate_table
+            value = value._asdict()
         if isinstance(value, list | tuple):
             return [self._plain(each, f"{what}[{k}]") for k, each in enumerate(value)]
         if isinstance(value, Mapping):

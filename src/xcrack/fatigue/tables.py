@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,15 @@ from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.fatigue.law import Bounds, GrowthLaw, Ratio
 from xcrack.fatigue.units import factors
 
-Curve = tuple[float, tuple[float, ...], tuple[float, ...]]
 _ROUND_OFF = 1e-12
+
+
+class Curve(NamedTuple):
+    """Points of one R: ranges and rates."""
+
+    R: float
+    dK: tuple[float, ...]
+    rate: tuple[float, ...]
 
 
 def checked_curves(value: Any, what: str, error: type[XcrackError]) -> tuple[Curve, ...]:
@@ -46,7 +53,7 @@ def _curve(R: Any, points: Any, what: str, error: type[XcrackError]) -> Curve:
             f"{what}: curve of R = {ratio:g}: give two or more points, ranges and rates "
             "positive and rising."
         )
-    return ratio, tuple(dK.tolist()), tuple(rate.tolist())
+    return Curve(ratio, tuple(dK.tolist()), tuple(rate.tolist()))
 
 
 @dataclass(frozen=True)
