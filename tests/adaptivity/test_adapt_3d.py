@@ -77,7 +77,7 @@ def test_surface_crack(tolerance):
     assert np.abs(adapted.sif.best[own, 0] / expected - 1).max() < 0.05
     finer = {60: 0.55614, 90: 0.57736, 120: 0.55632}
     assert largest_change(adapted, phi, finer) < min(tolerance, 0.01)
-    assert adapted.rounds[-1].unknowns < 50_000
+    assert adapted.rounds[-1].unknowns < 53_000
 
 
 @pytest.mark.slow

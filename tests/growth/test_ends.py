@@ -264,7 +264,9 @@ def test_bar_of_a_life_through_a_join():
         (M / 2 - 1) * C * STRESS**M * np.pi ** (M / 2)
     )
     off = abs(history.life / (N_JOIN + rest) - 1)
-    assert off <= history.life_bar.relative < 0.03
+    # The last of three steps ends in the join: no later solve tells its error, .05 of the bar.
+    assert off <= 0.01
+    assert off <= history.life_bar.relative < 0.06
 
 
 # --- nothing that grows --------------------------------------------------------------------------

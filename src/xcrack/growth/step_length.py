@@ -26,6 +26,7 @@ PAST, _PAST_WAY = 0.15, 0.2
 # Of the way to the boundary ahead: the longest step, and that times the cube root of the tolerance,
 # as K changes over such a way, and errs by the third power of a step.
 _AHEAD, _AHEAD_OF_FEW = 0.7, 3.2
+_AHEAD_AT_FIRST = 0.5  # of it: the first step, before a second K says how fast it changes
 _LIGAMENT = 0.2  # of the tolerance: cycles of a last ligament that no K need be known for
 
 
@@ -128,7 +129,7 @@ def first_control(rule: GrowthRule, size: float, least: float, room: float) -> S
     if rule.tolerance is None:
         return StepControl()
     length = first_length(size, STEPS * rule.tolerance, least)
-    return StepControl(_within(rule, length, room, least), None, least)
+    return StepControl(_within(rule, length, room, least, _AHEAD_AT_FIRST), None, least)
 
 
 def next_control(
@@ -171,9 +172,11 @@ def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:
     return room <= _LIGAMENT * rule.tolerance * cycles * rate
 
 
-def _within(rule: GrowthRule, length: float, room: float, least: float) -> float:
+def _within(
+    rule: GrowthRule, length: float, room: float, least: float, most: float = _AHEAD
+) -> float:
     """A length that leaves some of the way to the boundary ahead, but the least at least."""
-    share = min(_AHEAD, _AHEAD_OF_FEW * (STEPS * float(rule.tolerance or 1.0)) ** (1 / 3))
+    share = min(most, _AHEAD_OF_FEW * (STEPS * float(rule.tolerance or 1.0)) ** (1 / 3))
     return float(max(min(length, share * room), least))
 
 
