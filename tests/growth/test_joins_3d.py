@@ -251,7 +251,7 @@ def test_one_crack_is_not_looked_at(monkeypatch):
     def never(*arguments):
         raise AssertionError(arguments)
 
-    monkeypatch.setattr(joins_3d, "_close", never)
+    monkeypatch.setattr(joins_3d, "_close_pairs", never)
     assert len(list(grow(pennies(count=1), max_steps=2))) == 2
 
 

@@ -73,7 +73,7 @@ def distance_to_side(cracks: Sequence[Crack], c: int, x: Floats) -> Floats:
     """Distance of points to the nearest crack on which crack c ends, negative beyond it `(n,)`."""
     result = np.full(len(x), np.inf)
     for on, side in cracks[c].ends_on:
-        result = np.minimum(result, side * _signed(cracks[on], x))
+        result = np.minimum(result, side * _signed_distance(cracks[on], x))
     return result
 
 
@@ -117,7 +117,7 @@ def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
     return BodyBefore(body.mesh, body.boundary, body.facet_size, under)
 
 
-def _signed(crack: Crack, x: Floats) -> Floats:
+def _signed_distance(crack: Crack, x: Floats) -> Floats:
     return signed_in(triangle_tree(crack.points, crack.faces), x)[0]
 
 
@@ -197,7 +197,7 @@ def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, 
         for on, side in crack.ends_on:
             line = crossings(crack, cracks[on])
             if not len(line):
-                d = np.abs(_signed(cracks[on], crack.points))
+                d = np.abs(_signed_distance(cracks[on], crack.points))
                 line = crack.points[[int(np.argmin(d))]]
             inside = Body.of(mesh).contains(line)
             line = line[inside] if inside.any() else line

@@ -173,7 +173,7 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     for row in range(len(owner)):
         h, x = float(size[row]), faces.tip[row]
         along = np.array([np.cos(faces.direction[row]), np.sin(faces.direction[row])])
-        facing = _facing(row, faces, owner, 2 * _FACING * ahead * h, _BESIDE * h)
+        facing = _facing_tip(row, faces, owner, 2 * _FACING * ahead * h, _BESIDE * h)
         if facing is not None:
             middle = (x + faces.tip[facing]) / 2
             away = float((faces.tip[facing] - x) @ along) / 2
@@ -187,7 +187,7 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     return sorted(result, key=lambda met: met.away)
 
 
-def _facing(row: int, faces: Faces, owner: Ints, reach: float, room: float) -> int | None:
+def _facing_tip(row: int, faces: Faces, owner: Ints, reach: float, room: float) -> int | None:
     """The tip of another crack that comes towards this one, or has come past it just now."""
     direction = faces.direction
     along = np.array([np.cos(direction[row]), np.sin(direction[row])])
@@ -257,7 +257,7 @@ def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting
         if own.other < 0:
             crack = result[c]
             assert crack is not None
-            result[c] = _ended(crack, first, own.x, moved[own.tip], True)
+            result[c] = _with_new_end(crack, first, own.x, moved[own.tip], True)
         elif own.tip < own.other and (c, first) not in at_end:
             other, there = tip_of[own.other]
             last = (cracks[other].tips or ())[there] == 0
@@ -267,7 +267,7 @@ def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting
                 at_end[key] = own.x
                 crack = result[key[0]]
                 assert crack is not None
-                result[key[0]] = _ended(crack, key[1], own.x, moved[row], False)
+                result[key[0]] = _with_new_end(crack, key[1], own.x, moved[row], False)
             pairs.append(((c, first), (other, last), own.x))
     number = list(range(len(cracks)))
     for (c, _), (other, _), x in pairs:
@@ -277,12 +277,12 @@ def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting
         one, two = result[low], result[high]
         assert one is not None
         assert two is not None
-        result[low], result[high] = _one(one, two, x), None
+        result[low], result[high] = _crack_of_two(one, two, x), None
         number = [low if n == high else n for n in number]
     return [crack for crack in result if crack is not None]
 
 
-def _ended(crack: Crack, first: bool, x: Floats, replace: bool, drop: bool) -> Crack:
+def _with_new_end(crack: Crack, first: bool, x: Floats, replace: bool, drop: bool) -> Crack:
     """A crack with another end, which is a tip no more where asked for."""
     points = crack.points[::-1] if first else crack.points
     points = np.concatenate([points[:-1] if replace and len(points) > 2 else points, x[None]])
@@ -294,7 +294,7 @@ def _ended(crack: Crack, first: bool, x: Floats, replace: bool, drop: bool) -> C
     return polyline_crack(points[::-1] if first else points, tuple(sorted(tips)))
 
 
-def _one(one: Crack, two: Crack, x: Floats) -> Crack:
+def _crack_of_two(one: Crack, two: Crack, x: Floats) -> Crack:
     """Two cracks that end at x as one, in the direction of the first."""
     begins = np.array_equal(one.points[0], x)
     ends = two.points[::-1] if np.array_equal(two.points[0], x) == begins else two.points

@@ -400,7 +400,7 @@ def joined_fronts(crack: Crack, body: Body) -> Crack | None:
             if met is None:
                 continue
             rest = [front for k, front in enumerate(fronts) if k not in (i, j)]
-            rest += [] if i != j else [_middle(one, *pair)]
+            rest += [] if i != j else [_middle_of_front(one, *pair)]
             return _join(crack, pair, rest, float(body.cell_size(met[None])[0]), body)
     return None
 
@@ -426,7 +426,7 @@ def _thirds(front: Front) -> tuple[Front, Front] | None:
     return _piece(front, slice(0, first + 1)), _piece(front, slice(last, None))
 
 
-def _middle(front: Front, first: Front, last: Front) -> Front:
+def _middle_of_front(front: Front, first: Front, last: Front) -> Front:
     """An open front between the pieces at its ends."""
     return _piece(front, slice(len(first.x) - 1, len(front.x) - len(last.x) + 1))
 

@@ -250,10 +250,12 @@ def _reference() -> tuple[Floats, Floats]:
         for b in range(3):
             for power, f in slopes[b]:
                 for c in range(3):
-                    linear[a, b, c] += f * _mean(np.add(power, np.eye(3, dtype=int)[c]))
+                    linear[a, b, c] += f * _mean_of_monomial(np.add(power, np.eye(3, dtype=int)[c]))
             for c in range(3):
                 for p, f in slopes[b]:
-                    square[a, b, c] += sum(f * g * _mean(np.add(p, q)) for q, g in slopes[c])
+                    square[a, b, c] += sum(
+                        f * g * _mean_of_monomial(np.add(p, q)) for q, g in slopes[c]
+                    )
     return lock(linear), lock(square)
 
 
@@ -263,7 +265,7 @@ def _derivative(power: tuple[int, ...], b: int, factor: float) -> tuple[tuple[in
     return (lower, factor * power[b]) if power[b] else (power, 0.0)
 
 
-def _mean(power: Ints) -> float:
+def _mean_of_monomial(power: Ints) -> float:
     """Mean of a monomial of barycentric coordinates over a triangle: 2 a! b! c! / (a+b+c+2)!."""
     a, b, c = (int(p) for p in power)
     return 2 * factorial(a) * factorial(b) * factorial(c) / factorial(a + b + c + 2)

@@ -111,15 +111,15 @@ def interpolate_along_front(
     return result
 
 
-def _near(part: GrowthStations, values: Floats, x: Floats, mesh: Mesh) -> Floats:
+def _values_beside(part: GrowthStations, values: Floats, x: Floats, mesh: Mesh) -> Floats:
     """Values at the stations of a crack at points beside them; nan where there are none."""
     if not len(part.x):
         return np.full((len(x), *values.shape[1:]), np.nan)
     reach = REACH * float(cell_sizes(mesh, part.x).mean())
-    return interpolate_along_front(part.x, part.front, _closed(part), values, x, reach)
+    return interpolate_along_front(part.x, part.front, _closed_fronts(part), values, x, reach)
 
 
-def _closed(part: GrowthStations) -> list[bool]:
+def _closed_fronts(part: GrowthStations) -> list[bool]:
     """Of each front of a crack whether it is closed."""
     result = [False] * (int(part.front.max(initial=-1)) + 1)
     for number, closed in zip(part.front.tolist(), part.closed.tolist(), strict=True):
@@ -136,7 +136,7 @@ def front_lengths(crack: Crack) -> Floats:
 # Stations and solves of the cracks as they were solved, and as they are corrected.
 
 
-def _solved(
+def _solved_fronts(
     rule: GrowthRule, rates: Rates, identities: Identities, sigma: float
 ) -> tuple[GrowthStations, SolveHistory]:
     """All fronts as they were solved."""
@@ -191,7 +191,7 @@ def _corrected_part(
     x = np.concatenate([front.x for front in fronts])
     count = [len(front.x) for front in fronts]
     number = np.repeat(np.arange(len(fronts)), count)
-    rate = _near(here, solves.rate[0], x, mesh)
+    rate = _values_beside(here, solves.rate[0], x, mesh)
     there = ~np.isnan(rate) & inside_body(cracks, c, mesh, x)
     x, number = x[there], number[there]
     lengths = front_lengths(crack)
@@ -208,15 +208,15 @@ def _corrected_part(
         fresh=np.zeros(len(x), dtype=bool),
     )
     direction = np.stack(
-        [_near(here, solves.direction[0][:, k], x, mesh) for k in range(3)], axis=1
+        [_values_beside(here, solves.direction[0][:, k], x, mesh) for k in range(3)], axis=1
     )
-    rest = np.nan_to_num(_near(before, waits, x, mesh))
+    rest = np.nan_to_num(_values_beside(before, waits, x, mesh))
     unit = direction / np.linalg.norm(direction, axis=1)[:, None]
     part = replace(part, offset=rest[:, None] * unit)
     return part, replace(
         solves,
         rate=rate[there][None],
-        dK_eq=_near(here, solves.dK_eq[0], x, mesh)[None],
+        dK_eq=_values_beside(here, solves.dK_eq[0], x, mesh)[None],
         direction=direction[None],
         scale=np.full(len(x), crack_size(cracks, c, mesh)),
         bend=np.zeros(len(x)),
@@ -232,7 +232,9 @@ def _kinds_near(
         return kinds if lost is None else lost
     p = kinds.dK.shape[2]
     values = np.concatenate([kinds.dK[0], kinds.R[0]], axis=1)
-    near = interpolate_along_front(solved.x, solved.front, _closed(solved), values, x, np.inf)
+    near = interpolate_along_front(
+        solved.x, solved.front, _closed_fronts(solved), values, x, np.inf
+    )
     a = np.full((1, len(x)), float(kinds.a.flat[0]))
     sets = kinds.sets
     if sets is not None:
@@ -247,7 +249,7 @@ def _all_kinds(parts: Sequence[BlockCycles]) -> BlockCycles:
     return BlockCycles(dK, R, a, np.concatenate(sets) if sets else None)
 
 
-def _whole(
+def _all_cracks(
     parts: Sequence[tuple[GrowthStations, SolveHistory]],
 ) -> tuple[GrowthStations, SolveHistory]:
     """Stations and solves of all cracks."""
@@ -414,7 +416,7 @@ def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
     parts = [np.zeros(0)]
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
-        near = _near(stations.at(rows), plan.arc[rows], at.x[at.crack == c], mesh)
+        near = _values_beside(stations.at(rows), plan.arc[rows], at.x[at.crack == c], mesh)
         parts.append(np.nan_to_num(near))
     return np.concatenate(parts)
 
@@ -440,17 +442,17 @@ def begin_at(
 
     What overloads have left since the step before, `last`, is that of the nearest place.
     """
-    stations, solves = _solved(rule, rates, identities, 0.0)
+    stations, solves = _solved_fronts(rule, rates, identities, 0.0)
     zones = None if rule.retardation is None else no_zones(len(stations))
     if zones is not None and last is not None:
         zones = _zones_after(rule, last, stations.x)
     size = min((rates.problem.sizes[c] for c in set(stations.crack.tolist())), default=np.inf)
     solves = _with_mean_rates(rule, stations, solves, zones)
-    control = first_control(rule, size, _shortest(rule, stations, solves), np.inf)
+    control = first_control(rule, size, _shortest_step(rule, stations, solves), np.inf)
     return Corrected(cycles, rates.cracks, stations, solves, error, control, zones)
 
 
-def _shortest(rule: GrowthRule, stations: GrowthStations, solves: SolveHistory) -> float:
+def _shortest_step(rule: GrowthRule, stations: GrowthStations, solves: SolveHistory) -> float:
     """Shortest step of the fastest station, length."""
     if not len(stations):
         return 0.0
@@ -462,7 +464,7 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     """Advance the fronts of the last step again, now by the rates at both ends of the step."""
     plan, (stations, solves) = plan_of(last), solves_of(last)
     error = StepError((), 0.0) if last.error is None else last.error
-    solved = _solved(rule, rates, identities, plan.end)
+    solved = _solved_fronts(rule, rates, identities, plan.end)
     here = [_part(solved, c) for c in range(len(rates.cracks))]
     first_rate = _rate(rule, solves)
     fastest = float(first_rate.max(initial=0.0))
@@ -487,13 +489,13 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         rows = stations.crack == c
         again = None
         if share is not None and rows.any():
-            again = _again(rule, last, c, rates.cracks, share, direction)
+            again = _corrected_crack(rule, last, c, rates.cracks, share, direction)
         part = here[c]
         if again is None:
             crack = rates.cracks[c]
             growth = stations.growth(first_rate, plan.length)
             waits = np.where(plan.moves[rows], 0.0, growth[rows])
-            near = _near(stations.at(rows), waits, part[0].x, rule.problem.mesh)
+            near = _values_beside(stations.at(rows), waits, part[0].x, rule.problem.mesh)
             part = (
                 replace(part[0], offset=np.nan_to_num(near)[:, None] * part[1].direction[0]),
                 part[1],
@@ -509,7 +511,7 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
             zones.append(zones_onto(left, arc, way[rows], moved, part[0].x))
         cracks.append(crack)
         parts.append(part)
-    after, later = _whole(parts)
+    after, later = _all_cracks(parts)
     if rule.retardation is not None:
         kinds = [
             _kinds_near(each[0], _kinds(each[1]), part[0].x)
@@ -523,7 +525,7 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     off = share_left(rule) * float(gap.max(initial=0.0))
     control = next_control(
         rule, last.control, plan.length, off, own, cycles, last.cycles,
-        _shortest(rule, after, later), np.inf,
+        _shortest_step(rule, after, later), np.inf,
     )  # fmt: skip
     place = _errors_at(rule, last, rates, gap)
     return Corrected(
@@ -545,18 +547,19 @@ def _carried_back(
     for c, (part, values) in enumerate(here):
         rows = np.nonzero(stations.crack == c)[0]
         target = (stations.x + plan.move)[rows]
-        law_rate = _near(part, values.rate[0], target, mesh)
+        law_rate = _values_beside(part, values.rate[0], target, mesh)
         lost = np.isnan(law_rate)
-        near = np.nan_to_num(_near(part, _rate(rule, values), target, mesh))
+        near = np.nan_to_num(_values_beside(part, _rate(rule, values), target, mesh))
         rate[rows] = np.where(lost, first[rows], near)
         heading = np.stack(
-            [_near(part, values.direction[0][:, k], target, mesh) for k in range(3)], axis=1
+            [_values_beside(part, values.direction[0][:, k], target, mesh) for k in range(3)],
+            axis=1,
         )
         direction[rows] = np.where(lost[:, None], solves.direction[-1][rows], heading)
     return rate, direction
 
 
-def _again(
+def _corrected_crack(
     rule: GrowthRule,
     last: Step,
     c: int,
@@ -606,7 +609,7 @@ def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
         x, old = rates.sif[0][c].x, last.sif[0][c]
-        adds = _near(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
+        adds = _values_beside(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
         adds = np.nan_to_num(adds)
         if len(old.x) and last.error is not None:
             reach = 2 * REACH * float(cell_sizes(mesh, old.x).mean())
@@ -713,7 +716,7 @@ def _with_mean_rates(
     blocks = np.inf if rule.cycles is None else rule.cycles
     length = min(length, blocks * fastest)
     ratio = np.ones(len(stations))
-    ahead = _marched(rule, solves, [_kinds(solves)], zones, length, ratio, blocks)
+    ahead = _growth_ahead(rule, solves, [_kinds(solves)], zones, length, ratio, blocks)
     cycles = float(ahead.cycles[-1])
     grows = cycles > 0 and (ahead.reached >= length or cycles >= blocks * (1 - 1e-9))
     rate = ahead.arc[-1] / cycles if grows else 0.0 * ahead.arc[-1]
@@ -744,7 +747,7 @@ def _overloads_between(
         later.append(_kinds_near(part, _kinds(values), moved, first.at(rows)))
         ratio[rows] = rates.problem.sizes[c] / solves.scale[rows]
     assert last.zones is not None
-    done = _marched(
+    done = _growth_ahead(
         rule, solves, [first, _all_kinds(later)], last.zones, plan.length, ratio, np.inf
     )
     rest = plan.length / done.reached if 0 < done.reached < plan.length else 1.0
@@ -756,7 +759,7 @@ def _zones_after(rule: GrowthRule, last: Step, x: Floats) -> OverloadZones:
     plan, (stations, solves) = plan_of(last), solves_of(last)
     assert last.zones is not None
     ones, length = np.ones(len(stations)), plan.part * plan.length
-    done = _marched(rule, solves, [_kinds(solves)], last.zones, length, ones, np.inf)
+    done = _growth_ahead(rule, solves, [_kinds(solves)], last.zones, length, ones, np.inf)
     arc, moved = done.arc[-1], stations.x + plan.part * plan.move
     return zones_onto(done.zones, arc, arc, moved, x)
 
@@ -796,7 +799,7 @@ def zones_onto(
     return replace(zones.at(nearest), since=since[nearest])
 
 
-def _marched(
+def _growth_ahead(
     rule: GrowthRule,
     solves: SolveHistory,
     kinds: Sequence[BlockCycles],

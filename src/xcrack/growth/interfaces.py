@@ -19,7 +19,7 @@ from xcrack.fatigue.retardation import BlockCycles, OverloadZones, RetardationSe
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import rates_by_law_of
 from xcrack.growth.response import Response
-from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, stretch_of
+from xcrack.growth.solves import Growth, SolveHistory, Stretch, bisected_length, stretch_of
 from xcrack.growth.step import Step, plan_of, solves_of
 from xcrack.growth.uncertainty import best_K
 from xcrack.mesh.locate import cell_sizes
@@ -228,7 +228,7 @@ def singularity_at_interface(own: Isotropic, other: Isotropic) -> float:
         right += (alpha + beta**2) / (1 - beta**2)
         return bool(np.cos(np.pi * order) > right)
 
-    return sum(halved(is_above, 1.0)) / 2
+    return sum(bisected_length(is_above, 1.0)) / 2
 
 
 # A step that ends before an interface, or passes.
@@ -310,7 +310,7 @@ def _first_end(piece: Stretch, target: Floats) -> tuple[float, int]:
         def before(part: float, row: int = row) -> bool:
             return bool(piece.arcs(part)[0][row] < target[row])
 
-        part = halved(before, length, _SPLITS)[1]
+        part = bisected_length(before, length, _SPLITS)[1]
         if part < length or first < 0:
             length, first = part, row
     return length, first

@@ -87,7 +87,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         return own or plan
     if len(plan.cracks) < 2:
         return plan
-    close = _close(plan.cracks, body, step.corrected)
+    close = _close_pairs(plan.cracks, body, step.corrected)
     facing = {pair for pair, _, _ in close}  # their fronts join; faces are those of other pairs
     faces = [pair for pair in _faces_met(plan.cracks, body) if pair not in facing]
     if not close and not faces:
@@ -98,7 +98,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         raise GeometryError(f"cracks {i} and {k} meet near {at(close[0][1].x)}, and {hindrance}")
     m = solves_of(step)[1].exponent
     time, way, plain = min(
-        [_met(rule, step, plan, *each, body, m) for each in close]
+        [_shares_at_meeting(rule, step, plan, *each, body, m) for each in close]
         + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
     )
     now = _advanced(rule, step, plan, way)
@@ -117,7 +117,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
             now = place_arms(now, rule.problem.mesh)
         joins.append(Join(step.index + 1, step.cycles + cycles, tuple(met.x.tolist()), pair))
     number = list(range(len(now)))
-    while pairs := _close(now, body):
+    while pairs := _close_pairs(now, body):
         (i, k), gap, size = pairs[0]
         other = now[k] if gap.turn > 0 else turned_crack(now[k])
         across = STEP * size if gap.offset > OFFSET * size else 0.0
@@ -301,7 +301,7 @@ def _met_face(
     return plain * part_of_time(gap / step.sizes[c], exponent, 3), way, plain
 
 
-def _close(
+def _close_pairs(
     cracks: Sequence[Crack], body: Body, before: Sequence[Crack] = ()
 ) -> list[tuple[tuple[int, int], FrontGap, float]]:
     """Pairs of cracks in one surface whose fronts are too close to be solved, nearest first.
@@ -332,7 +332,7 @@ def _is_facing(one: Crack, other: Crack, body: Body) -> bool:
     return gap is not None and gap.faces
 
 
-def _met(
+def _shares_at_meeting(
     rule: GrowthRule,
     step: Step,
     plan: Plan,

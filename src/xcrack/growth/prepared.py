@@ -204,7 +204,7 @@ def finer(rule: GrowthRule, steps_of: Steps, last: Step | None) -> tuple[Mesh, b
     mesh = refine(mesh, size=corridor(seen, ways, chosen, sizes, most))
     wanted = SHARE / TOGETHER * float(rule.tolerance or 0.0) / max(seen.exponent, _LEAST_EXPONENT)
     for number in range(twin.ROUNDS):
-        each = [_measured(rule, mesh, stage) for stage in stages]
+        each = [_bars_of_stage(rule, mesh, stage) for stage in stages]
         there = [k for k, now in enumerate(each) if now is not None]
         good = [now for now in each if now is not None]
         if not good:
@@ -246,7 +246,7 @@ def _warn_of_most(rule: GrowthRule, most: int, instead: str) -> None:
     )
 
 
-def _measured(rule: GrowthRule, mesh: Mesh, stage: Stage) -> Indicators | None:
+def _bars_of_stage(rule: GrowthRule, mesh: Mesh, stage: Stage) -> Indicators | None:
     """K of a stage with its bars; None where that mesh has none."""
     with collected_warnings([]):  # they come again in the run
         try:
@@ -303,10 +303,10 @@ def replanned(
     mesh = _mesh_for_kinks(rule, step) if last is None else None
     if mesh is not None:
         return replace(on(rule, mesh), meshes=rule.meshes + 1), None
-    shorter = None if last is None else _shortened(last, step)
+    shorter = None if last is None else _step_before(last, step)
     if shorter is not None:  # what the mesh leaves to be wished is seen on a step that stays
         return rule, shorter
-    if not _outgrown(rule, last, step):
+    if not _is_mesh_too_coarse(rule, last, step):
         return None
     mesh, is_largest = _mesh_with_room(rule, last) if _has_no_bar(step) else None, False
     if mesh is None and _ends_soon(rule, step):
@@ -317,7 +317,7 @@ def replanned(
     return other, last if last is None else _with_room(rule, other, last, step)
 
 
-def _shortened(last: Step, step: Step) -> Step | None:
+def _step_before(last: Step, step: Step) -> Step | None:
     """The step before one whose error is too large, with a shorter way ahead; None if that is not.
 
     It follows from what is stored with both: a run that is taken up again does the same.
@@ -383,7 +383,7 @@ def _mesh_with_room(rule: GrowthRule, last: Step | None) -> Mesh | None:
     return refine(scene.mesh, size=growing_sizes(place, size, _SLOPE))
 
 
-def _outgrown(rule: GrowthRule, last: Step | None, step: Step) -> bool:
+def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool:
     """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
     error = step.error
     if not rule.estimates or error is None or not step.n_tips or rule.meshes >= _MOST:
@@ -393,8 +393,10 @@ def _outgrown(rule: GrowthRule, last: Step | None, step: Step) -> bool:
         return False  # it was made for this step, or for a kink just behind it
     tolerance = float(rule.tolerance or 0.0)
     forgiven = 1.0 if rule.meshes == 0 else _FORGIVEN
-    rate, turn = _local(rule, step)
-    before_it = (np.inf, np.inf) if rule.meshes == 0 or last is None else _local(rule, last)
+    rate, turn = _errors_of_step(rule, step)
+    before_it = (
+        (np.inf, np.inf) if rule.meshes == 0 or last is None else _errors_of_step(rule, last)
+    )
     if rule.meshes and _has_no_bar(step) and _mesh_with_room(rule, last) is None:
         return False
     if not _has_no_bar(step):
@@ -442,11 +444,11 @@ def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
     if largest > _STRAIGHT or not np.isfinite(error.rate):
         return False
     wanted = _MARGIN * float(rule.tolerance or 0.0)
-    rate, turn = _local(rule, last)
+    rate, turn = _errors_of_step(rule, last)
     return rate <= SHARE * wanted and turn <= (1 - PATH) * wanted
 
 
-def _local(rule: GrowthRule, step: Step) -> tuple[float, float]:
+def _errors_of_step(rule: GrowthRule, step: Step) -> tuple[float, float]:
     """Errors of rate and direction at a step by K, as they count for life and path."""
     error = step.error
     if error is None or np.isnan(error.rate):  # a finer mesh may have one

@@ -155,17 +155,17 @@ def rates_at(solves: SolveHistory, s: Floats, threshold: float = 0.0) -> Floats:
     cracks of length a: as a power series in a² (Isida 1973, in Sih, Mechanics of Fracture 1).
     """
     if solves.rate_bend is None:
-        rate = _positive(solves, solves.rate, s, solves.exponent)
+        rate = _positive_power(solves, solves.rate, s, solves.exponent)
     else:
         smooth = solves.rate * np.exp(-solves.rate_bend * np.sqrt(solves.sigma[:, None]))
-        rate = _positive(solves, smooth, s, solves.exponent)
+        rate = _positive_power(solves, smooth, s, solves.exponent)
         rate = rate * np.exp(solves.rate_bend * np.sqrt(s[:, None]))
     if threshold > 0:
-        rate = np.where(_positive(solves, solves.dK_eq, s, 1.0) < threshold, 0.0, rate)
+        rate = np.where(_positive_power(solves, solves.dK_eq, s, 1.0) < threshold, 0.0, rate)
     return rate
 
 
-def _positive(solves: SolveHistory, values: Floats, s: Floats, exponent: float) -> Floats:
+def _positive_power(solves: SolveHistory, values: Floats, s: Floats, exponent: float) -> Floats:
     nodes = np.log(solves.scale + solves.sigma[:, None])
     x = np.log(solves.scale + s[:, None])
     with np.errstate(over="ignore", under="ignore"):
@@ -211,7 +211,9 @@ def lagrange(nodes: Floats, values: Floats, x: Floats) -> Floats:
     return result
 
 
-def halved(holds: Callable[[float], bool], most: float, times: int = 40) -> tuple[float, float]:
+def bisected_length(
+    holds: Callable[[float], bool], most: float, times: int = 40
+) -> tuple[float, float]:
     """Lengths between which a condition ceases to hold, in [0, most].
 
     Parameters
@@ -332,7 +334,7 @@ class Stretch:
         """First part that takes a number of cycles, at most all of it, length."""
         if self.arcs()[1] <= cycles:
             return self.length
-        return halved(lambda part: self.arcs(part)[1] < cycles, self.length, _PASSES)[1]
+        return bisected_length(lambda part: self.arcs(part)[1] < cycles, self.length, _PASSES)[1]
 
     def growing_length(self) -> float:
         """Part up to which anything grows, length."""
@@ -343,7 +345,7 @@ class Stretch:
 
         if grows(self.length):
             return self.length
-        return halved(grows, self.length, _PASSES)[0]
+        return bisected_length(grows, self.length, _PASSES)[0]
 
 
 def stretch_of(
@@ -385,7 +387,7 @@ __all__ = [
     "SolveHistory",
     "Stretch",
     "angles_at",
-    "halved",
+    "bisected_length",
     "lagrange",
     "rates_at",
     "stretch_of",

@@ -129,7 +129,7 @@ def first_control(rule: GrowthRule, size: float, least: float, room: float) -> S
     if rule.tolerance is None:
         return StepControl()
     length = first_length(size, STEPS * rule.tolerance, least)
-    return StepControl(_within(rule, length, room, least, _AHEAD_AT_FIRST), None, least)
+    return StepControl(_length_in_room(rule, length, room, least, _AHEAD_AT_FIRST), None, least)
 
 
 def next_control(
@@ -162,7 +162,7 @@ def next_control(
         off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * rule.tolerance, way
     )
     wanted = next_length(length, error, last.error, least)
-    return StepControl(_within(rule, wanted, room, least), error, least)
+    return StepControl(_length_in_room(rule, wanted, room, least), error, least)
 
 
 def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:
@@ -172,7 +172,7 @@ def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:
     return room <= _LIGAMENT * rule.tolerance * cycles * rate
 
 
-def _within(
+def _length_in_room(
     rule: GrowthRule, length: float, room: float, least: float, most: float = _AHEAD
 ) -> float:
     """A length that leaves some of the way to the boundary ahead, but the least at least."""

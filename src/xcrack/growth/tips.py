@@ -49,7 +49,14 @@ from xcrack.growth.rates import (
     kinds_of,
     rates_by_law_of,
 )
-from xcrack.growth.solves import Growth, SolveHistory, Stretch, halved, rates_at, stretch_of
+from xcrack.growth.solves import (
+    Growth,
+    SolveHistory,
+    Stretch,
+    bisected_length,
+    rates_at,
+    stretch_of,
+)
 from xcrack.growth.stations import GrowthStations, Identities
 from xcrack.growth.step import (
     Plan,
@@ -86,7 +93,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     rate = np.concatenate([np.zeros(0), *step.rate])
     if not (rate > 0).any() or np.isinf(rate).any():
         return Plan.at_rest(step, cell)
-    stretch, stops = _ahead(rule, step)
+    stretch, stops = _piece_ahead(rule, step)
     growth = _growth(stations, stretch)
     near = interfaces_ahead(rule, stations.x, growth.move)
     if near is not None and (growth.arc > near.stop).any():
@@ -115,12 +122,12 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         plan = replace(plan, cracks=tuple(after), moves=moves)
         # Where plastic zones end the run, they do so before the tips meet.
         met = meetings(after, rule.problem.mesh) if rule.link_up is None else []
-        return _met(rule, step, plan, stretch, met) if met else plan
+        return _step_to_meeting(rule, step, plan, stretch, met) if met else plan
     except GeometryError as error:
         return replace(plan, limit="geometry", refusal=str(error))
 
 
-def _ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
+def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
     """The next piece of σ, and whether all growth is seen to stop at its end."""
     solves = solves_of(step)[1]
     known = solves.last(2)
@@ -197,11 +204,11 @@ def _up_to_boundary(
         stretch = replace(longest_stretch, length=stretch.length)
 
     def holds(length: float) -> bool:
-        return _inside(mesh, (stations.x + _growth(stations, stretch, length).move)[leaves])
+        return _is_inside(mesh, (stations.x + _growth(stations, stretch, length).move)[leaves])
 
     if holds(longer):  # it runs along a side
         return stretch, growth
-    length = halved(holds, longer)[1]
+    length = bisected_length(holds, longer)[1]
     return replace(stretch, length=length), _growth(stations, stretch, length)
 
 
@@ -210,7 +217,9 @@ def _growth(stations: GrowthStations, stretch: Stretch, length: float | None = N
     return stretch.growth(frame, stretch.solves.angles(frame), length)
 
 
-def _met(rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, met: list[Meeting]) -> Plan:
+def _step_to_meeting(
+    rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, met: list[Meeting]
+) -> Plan:
     """A step that ends when the first tip meets another crack, and the cracks joined there."""
     stations = solves_of(step)[0]
     faces = last_faces(plan.cracks)
@@ -296,7 +305,7 @@ def _arrival(left: Callable[[float], float], most: float) -> float:
     """Length of σ after which nothing is left of a way; inf where that takes too long."""
     if left(most) > 0:
         return np.inf
-    return halved(lambda length: left(length) > 0, most)[1]
+    return bisected_length(lambda length: left(length) > 0, most)[1]
 
 
 def ends_of(step: Step, plan: Plan) -> Floats:
@@ -383,11 +392,11 @@ def _kink(
 ) -> tuple[Floats, Floats, Bools]:
     """Limit angle of the kinks of a crack, T/K_I behind them, and where they are known."""
 
-    def quiet(K: Floats) -> Floats:
+    def without_warning(K: Floats) -> Floats:
         with collected_warnings([]):
             return own.angle_of_K(clipped_K(K))
 
-    theta, converged = limit_angles(quiet, clipped_K(own.K))
+    theta, converged = limit_angles(without_warning, clipped_K(own.K))
     kinked = turns & converged
     theta = np.where(kinked, theta, 0.0)
     opening = clipped_K(kinked_K(clipped_K(rates.K[:, rows]), theta))[..., 0]
@@ -439,7 +448,7 @@ def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
     stations = _stations(rates.cracks, identities, rates.stations.x, np.zeros(n, dtype=bool))
     solves = first_solves(rule, rates)
     zones = None if rule.retardation is None else no_zones(n)
-    control = _first(rule, stations, solves, rates)
+    control = _first_length(rule, stations, solves, rates)
     error = StepError(rates.split(np.zeros(n)), 0.0)
     return Corrected(0.0, rates.cracks, stations, solves, error, control, zones)
 
@@ -473,14 +482,14 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     if len(rows) < len(plan.arc):
         return _without_lost_tips(rule, last, rates, identities, rows)
     if np.isinf(rates.rate).any():
-        return _broken(last, rates, identities)
+        return _last_step_of_run(last, rates, identities)
     near = interfaces_ahead(rule, solves_of(last)[0].x, plan.move)
     if near is not None and (plan.arc > near.way).any():
-        return _passed(rule, last, rates, identities, near)
-    return _corrected(rule, last, rates, identities)
+        return _step_through_interface(rule, last, rates, identities, near)
+    return _corrected_points(rule, last, rates, identities)
 
 
-def _passed(
+def _step_through_interface(
     rule: GrowthRule, last: Step, rates: Rates, identities: Identities, near: InterfacesAhead
 ) -> Corrected:
     """A step in which tips have passed into other materials: each part counts by its own law.
@@ -558,7 +567,7 @@ def _passed(
         after_it,
         solves,
         StepError(error.place, error.cycles + own_error, behind=error.behind),
-        last.control if goes_on else _first(rule, after_it, solves, rates),
+        last.control if goes_on else _first_length(rule, after_it, solves, rates),
         done.zones,
     )
 
@@ -575,7 +584,9 @@ def _with_jumps(solves: SolveHistory, jumps: Bools, k: int) -> SolveHistory:
     return replace(solves, kinds=BlockCycles(dK, R, a, kinds.sets))
 
 
-def _corrected(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+def _corrected_points(
+    rule: GrowthRule, last: Step, rates: Rates, identities: Identities
+) -> Corrected:
     """Correct the last points by the parabola through the last three solves."""
     plan, error = plan_of(last), _error(last)
     stations, old = solves_of(last)
@@ -653,7 +664,7 @@ def _error(step: Step) -> StepError:
     return step.error
 
 
-def _first(
+def _first_length(
     rule: GrowthRule, stations: GrowthStations, solves: SolveHistory, rates: Rates
 ) -> StepControl:
     """Length of the first step."""
@@ -856,7 +867,7 @@ def _without_lost_tips(
         stations,
         solves,
         StepError(rates.split(lost), error.cycles + own, behind=error.behind),
-        _first(rule, stations, solves, rates),
+        _first_length(rule, stations, solves, rates),
         zones,
     )
 
@@ -865,20 +876,20 @@ def _exit(rule: GrowthRule, last: Step, ahead: Stretch, lost: Ints) -> float:
     """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
     plan, mesh = plan_of(last), rule.problem.mesh
     stations = solves_of(last)[0]
-    if _inside(mesh, (stations.x + plan.move)[lost]):
+    if _is_inside(mesh, (stations.x + plan.move)[lost]):
         return plan.length
 
     def holds(length: float) -> bool:
-        return _inside(mesh, (stations.x + _growth(stations, ahead, length).move)[lost])
+        return _is_inside(mesh, (stations.x + _growth(stations, ahead, length).move)[lost])
 
-    return halved(holds, plan.length)[1]
+    return bisected_length(holds, plan.length)[1]
 
 
-def _inside(mesh: Mesh, x: Floats) -> bool:
+def _is_inside(mesh: Mesh, x: Floats) -> bool:
     return bool(contains(mesh, x).all())
 
 
-def _broken(last: Step, rates: Rates, identities: Identities) -> Corrected:
+def _last_step_of_run(last: Step, rates: Rates, identities: Identities) -> Corrected:
     """The last step of a run, at whose end a rate is infinite: no polynomial leads there.
 
     The inverse of the largest rate is taken to fall to zero along the step, as `cycles_between`

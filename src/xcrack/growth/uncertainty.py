@@ -33,7 +33,7 @@ _WHOLE = 1.0  # relative error of a rate that may as well be zero, or infinite
 
 def best_K(sif: Answers) -> Answers:
     """K of all states and cracks, replaced by the best one wherever that is known."""
-    return tuple(tuple(_best(crack) for crack in state) for state in sif)
+    return tuple(tuple(_best_K(crack) for crack in state) for state in sif)
 
 
 def uses_best(sif: SIF) -> Bools:
@@ -43,7 +43,7 @@ def uses_best(sif: SIF) -> Bools:
     return np.asarray(np.isfinite(sif.best).all(axis=1))
 
 
-def _best(sif: SIF) -> SIF:
+def _best_K(sif: SIF) -> SIF:
     known = uses_best(sif)
     return replace(sif, K=np.where(known[:, None], sif.best, sif.K)) if known.any() else sif
 
@@ -80,8 +80,8 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
     sif : sequence of sequence of SIF
         With bars.
     """
-    bar = [_stacked(sif, c, lambda s: s.bar) for c in range(len(rates.cracks))]
-    own = [_stacked(sif, c, _contact_part) for c in range(len(rates.cracks))]
+    bar = [_stacked_K(sif, c, lambda s: s.bar) for c in range(len(rates.cracks))]
+    own = [_stacked_K(sif, c, _contact_part) for c in range(len(rates.cracks))]
     known = np.concatenate([np.isfinite(b).all(axis=(0, 2)) for b in bar])
     surface = np.concatenate([crack.at_surface for crack in sif[0]])
     rate, angle = rates.law_rate, rates.angle
@@ -91,7 +91,7 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
     for mode, both in enumerate(moved):
         change, turned = np.zeros(n), np.zeros(n)
         for other_angle, other in both:
-            change = np.maximum(change, _relative(rate, other))
+            change = np.maximum(change, _log_ratio(rate, other))
             turned = np.maximum(turned, np.abs(other_angle - angle))
         share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(own, bar)])
         total, contact, turn = total + change, contact + share * change, turn + turned
@@ -225,7 +225,8 @@ def _rates_of_moved_K(
     n_modes = rates.sif[0][0].K.shape[1] if rates.sif and rates.sif[0] else 0
     if isinstance(rule.cycle, Spectrum) or rates.free is not None:
         return [
-            [_moved(rule, rates, bar, mode, sign) for sign in _SIGNS] for mode in range(n_modes)
+            [_moved_rates(rule, rates, bar, mode, sign) for sign in _SIGNS]
+            for mode in range(n_modes)
         ]
     # Of a cycle, K of its states is all that changes: all K are asked for at once, side by side.
     inputs = criterion_inputs(rule, rates.problem, rates.response)
@@ -243,7 +244,7 @@ def _rates_of_moved_K(
     return [list(zip(*both, strict=True)) for both in zip(angle, rate, strict=True)]
 
 
-def _moved(
+def _moved_rates(
     rule: GrowthRule, rates: Rates, bar: Sequence[Floats], mode: int, sign: float
 ) -> tuple[Floats, Floats]:
     """Directions and rates with one mode of K moved by its bars."""
@@ -280,14 +281,14 @@ def _moved_K(given: Floats, bar: Floats, mode: int, sign: float) -> Floats:
     return K
 
 
-def _relative(rate: Floats, other: Floats) -> Floats:
+def _log_ratio(rate: Floats, other: Floats) -> Floats:
     """|ln| of the ratio of two rates; at most a whole where one of them is zero or infinite."""
     good = (rate > 0) & np.isfinite(rate) & (other > 0) & np.isfinite(other)
     ratio = np.where(good, other, 1.0) / np.where(good, rate, 1.0)
     return np.asarray(np.where(good, np.abs(np.log(ratio)), np.where(rate == other, 0.0, _WHOLE)))
 
 
-def _stacked(sif: Answers, c: int, part: Callable[[SIF], Floats]) -> Floats:
+def _stacked_K(sif: Answers, c: int, part: Callable[[SIF], Floats]) -> Floats:
     return np.stack([part(state[c]) for state in sif])
 
 

@@ -100,8 +100,10 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
     return TipErrors(
         result.eta.reshape(shape),
         result.shares.reshape(*shape, -1),
-        _near(solutions[0], result, kinks_inside(solutions[0], crack)).reshape(shape),
-        _near(solutions[0], result, _interface_ends(solutions[0], crack)).reshape(shape),
+        _contributions_near(solutions[0], result, kinks_inside(solutions[0], crack)).reshape(shape),
+        _contributions_near(solutions[0], result, _interface_ends(solutions[0], crack)).reshape(
+            shape
+        ),
         result.shares[..., at_junctions].sum(axis=-1).reshape(shape),
         result.end.reshape(shape),
         bend.reshape(shape),
@@ -130,7 +132,7 @@ def _interface_ends(solution: Solution, crack: int) -> Floats:
     return np.concatenate([mesh.points[nodes], lips.x[order[1:][crosses]]])
 
 
-def _near(solution: Solution, result: Estimate, x: Floats) -> Floats:
+def _contributions_near(solution: Solution, result: Estimate, x: Floats) -> Floats:
     """Absolute contributions of the cells at some points `(states, m)`."""
     if not len(x):
         return np.zeros_like(result.eta)
@@ -286,7 +288,8 @@ def _bars(
     eta = bar_of_estimate + shape
     shares = errors.shares[k].sum(axis=-1)
     parts = (
-        _ETA * _with_room(solution, crack)[:, None] * bar_of_estimate, _SHARES * shares, _SPREAD * sif.spread,
+        _ETA * _with_room(solution, crack)[:, None] * bar_of_estimate, _SHARES * shares,
+        _SPREAD * sif.spread,
         _AT_KINKS * errors.kinks[k], _AT_INTERFACES * errors.interfaces[k],
         _AT_JUNCTIONS * errors.junctions[k],
     )  # fmt: skip

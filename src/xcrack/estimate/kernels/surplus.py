@@ -18,7 +18,7 @@ def _slopes(bary, gradient, sign, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _same(cell, side, q):  # type: ignore[no-untyped-def]
+def _is_same_side(cell, side, q):  # type: ignore[no-untyped-def]
     """Whether the next point lies in the same cell, on the same sides."""
     if q + 1 == len(cell) or cell[q + 1] != cell[q]:
         return False
@@ -72,7 +72,7 @@ def add_functional(residual, cell, bary, side, factor, functions, sign, copy, cr
                     first, second = factor[q, i, 0, m], factor[q, i, 1, m]
                     for a in range(4):
                         part[i, m, a] += first * slope[a, 0] + second * slope[a, 1]
-        if not _same(cell, side, q):
+        if not _is_same_side(cell, side, q):
             _hand_over(part, residual, functions[e], copy, crack, side[q])
 
 
@@ -127,7 +127,7 @@ def take_stress(  # type: ignore[no-untyped-def]
             direct_part[a, 0] += w * (both * x * x + mu * y * y)
             direct_part[a, 1] += w * (both * y * y + mu * x * x)
             direct_part[a, 2] += w * (lam + mu) * x * y
-        if _same(cell, side, q):
+        if _is_same_side(cell, side, q):
             continue
         _hand_over(part, residual, functions[e], copy, crack, side[q])
         for a in range(4):
