@@ -193,10 +193,12 @@ def _set_size(gmsh: ModuleType, size: float | Callable[[Floats], Any]) -> list[B
         # gmsh asks point by point, and an error raised here would be lost in its code.
         if not failures:
             try:
-                value = np.ravel(call_function(size, "size", np.array([[x, y, z]])))
-                return length_of(
-                    value.tolist()[0] if len(value) == 1 else value, f"size at {[x, y, z]}"
-                )
+                value = call_function(size, "size", np.array([[x, y, z]]))
+                if isinstance(value, np.ndarray) and value.size == 1:
+                    value = value.ravel()[0]
+                if isinstance(value, list | tuple) and len(value) == 1:
+                    value = value[0]
+                return length_of(value, f"size at {[x, y, z]}")
             except BaseException as error:
                 failures.append(error)
         return 1e22
