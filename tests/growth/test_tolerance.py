@@ -208,10 +208,10 @@ def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch)
     when the tip has left the fine cells.
     """
     monkeypatch.setattr(outgrown, "_BEGIN", 0.1)
-    asks = outgrown._outgrown
+    asks = outgrown._is_mesh_too_coarse
     monkeypatch.setattr(
         outgrown,
-        "_outgrown",
+        "_is_mesh_too_coarse",
         lambda rule, last, step: asks(rule, last, step) or (rule.meshes == 1 and step.index == 6),
     )
     real, begins = prepared.scouted, []
