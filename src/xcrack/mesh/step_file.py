@@ -195,7 +195,7 @@ def _set_size(gmsh: ModuleType, size: float | Callable[[Floats], Any]) -> list[B
             try:
                 value = call_function(size, "size", np.array([[x, y, z]]))
                 if isinstance(value, np.ndarray) and value.size == 1:
-                    value = value.ravel()[0]
+                    value = value.item()
                 if isinstance(value, list | tuple) and len(value) == 1:
                     value = value[0]
                 return length_of(value, f"size at {[x, y, z]}")
