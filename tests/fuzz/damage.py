@@ -23,6 +23,7 @@ from fuzz.case_entries import CASE, TOML
 from fuzz.entry import Input
 from fuzz.kinds import EDGE
 from fuzz.outcome import BAD, GOOD, Outcome, outcome_of
+from support.case_texts import STRIP_PULL
 from support.decks import ARCHIVE, box_cases
 
 DATA = Path(__file__).parents[1] / "data"
@@ -179,16 +180,6 @@ def decks(rng):
     return f"a deck for {read.__name__}", call
 
 
-_PULL = """
-[[loads]]
-kind = "traction"
-where = "top"
-value = [0.0, "80 MPa"]
-[[loads]]
-kind = "traction"
-where = "bottom"
-value = [0.0, "-80 MPa"]
-"""
 _ASSESSED = """
 [growth]
 law = { kind = "metal", name = "2024-T3 sheet, L-T" }
@@ -281,7 +272,7 @@ where = [0.0, 0.0]
 
 def full_cases(rng):
     """Case files that use all tables."""
-    plate = CASE.format(**TOML).replace("[solve]", _PULL + "[solve]")
+    plate = CASE.format(**TOML).replace("[solve]", STRIP_PULL + "[solve]")
     base = [plate + _ASSESSED, plate + _TABLED, _SPECIMEN, _OF_DECK.replace("[[mesh_free]]\n", "")]
     content = mutated_text(rng, base[int(rng.integers(len(base)))])
 

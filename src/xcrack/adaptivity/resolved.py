@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from xcrack.adaptivity.sizes_2d import growing_sizes
 from xcrack.base.arrays import Floats, ranges
 from xcrack.base.errors import CoarseMeshError
 from xcrack.crack.crack import Crack
@@ -13,7 +12,7 @@ from xcrack.crack.measures import area_inside, length_inside
 from xcrack.mesh.locate import Body, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import graded_sizes, with_room
-from xcrack.mesh.refinement import refine
+from xcrack.mesh.refinement import growing_sizes, refine
 from xcrack.mesh.triangulation import loops
 from xcrack.model.problem import Problem
 

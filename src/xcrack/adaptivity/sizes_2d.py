@@ -4,7 +4,7 @@ The first is smaller at tips and kinks; in the next ones cells that contribute m
 bisected.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from xcrack.crack.measures import length_inside
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import distance_to_simplices
-from xcrack.mesh.refinement import refine, refine_to
+from xcrack.mesh.refinement import growing_sizes, refine, refine_to
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import KErrors
 
@@ -88,16 +88,6 @@ def first_mesh(problem: Problem) -> Mesh:
     if (cell_sizes(problem.mesh, place) <= size).all():
         return problem.mesh
     return refine(problem.mesh, size=growing_sizes(place, size, _SLOPE))
-
-
-def growing_sizes(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
-    """Sizes of cells at points that grow with the distance from places `(n, 2)` by a slope."""
-
-    def wanted_size(x: Floats) -> Floats:
-        distance = np.linalg.norm(x[:, None] - place, axis=2)
-        return np.asarray((size + slope * distance).min(axis=1))
-
-    return wanted_size
 
 
 def tip_sizes(problem: Problem) -> tuple[Floats, Floats]:
@@ -241,7 +231,6 @@ def joint_mesh(indicators: Sequence[Indicators], target: Sequence[float], aim: f
 __all__ = [
     "at_coarse_tips",
     "first_mesh",
-    "growing_sizes",
     "joint_mesh",
     "next_mesh",
     "size_ratios",

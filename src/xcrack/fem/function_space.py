@@ -123,6 +123,10 @@ class FunctionSpace:
         """Radius of the enriched disc of each tip, length."""
         return np.array([tip.radius for tip in self.tips])
 
+    def tips_of(self, crack: int) -> list[int]:
+        """Numbers of the tips, or fronts, of a crack in `tips`."""
+        return [t for t, tip in enumerate(self.tips) if tip.crack == crack]
+
     @cached_property
     def cell_nodes(self) -> Ints:
         """Nodes of each cell `(m, n_shapes)`."""

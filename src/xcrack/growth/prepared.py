@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from xcrack.adaptivity.indicators import Indicators, indicators_of
-from xcrack.adaptivity.sizes_2d import growing_sizes, tip_sizes
+from xcrack.adaptivity.sizes_2d import tip_sizes
 from xcrack.base.arrays import Floats
 from xcrack.base.errors import (
     GeometryError,
@@ -38,7 +38,7 @@ from xcrack.growth.tips import LONGER_FIRST
 from xcrack.growth.uncertainty import TOGETHER
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.refinement import refine
+from xcrack.mesh.refinement import growing_sizes, refine
 from xcrack.model.problem import Problem
 
 SHARE = 0.4  # of the tolerance: what K may take
@@ -367,20 +367,22 @@ def _mesh_for_kinks(rule: GrowthRule, first: Step) -> Mesh | None:
 
 
 def _mesh_with_room(rule: GrowthRule, last: Step | None) -> Mesh | None:
-    """Finer cells where the tips of the next step are too close to a boundary or to each other.
+    """Finer cells where the tips of the next step have too little room; None where they do not."""
+    size = _sizes_for_room(rule, last)
+    return None if size is None else refine(rule.problem.mesh, size=size)
 
-    None where there are none, or other reasons leave no bar.
-    """
+
+def _sizes_for_room(rule: GrowthRule, last: Step | None) -> Callable[[Floats], Floats] | None:
+    """Sizes of the cells of `_mesh_with_room`; None where it makes none."""
     if last is None or rule.problem.mesh.dim == 3:
         return None
     try:
-        scene = replace(rule.problem, cracks=plan_of(last).cracks)
-        place, size = tip_sizes(scene)
+        place, size = tip_sizes(replace(rule.problem, cracks=plan_of(last).cracks))
     except GeometryError:
         return None
-    if (cell_sizes(scene.mesh, place) <= size).all():
+    if (cell_sizes(rule.problem.mesh, place) <= size).all():
         return None
-    return refine(scene.mesh, size=growing_sizes(place, size, _SLOPE))
+    return growing_sizes(place, size, _SLOPE)
 
 
 def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool:
@@ -394,13 +396,10 @@ def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool
     tolerance = float(rule.tolerance or 0.0)
     forgiven = 1.0 if rule.meshes == 0 else _FORGIVEN
     rate, turn = _errors_of_step(rule, step)
-    before_it = (
-        (np.inf, np.inf) if rule.meshes == 0 or last is None else _errors_of_step(rule, last)
-    )
-    if rule.meshes and _has_no_bar(step) and _mesh_with_room(rule, last) is None:
+    if rule.meshes and _has_no_bar(step) and _sizes_for_room(rule, last) is None:
         return False
-    if not _has_no_bar(step):
-        rate, turn = min(rate, before_it[0]), min(turn, before_it[1])
+    if rule.meshes and last is not None and not _has_no_bar(step):
+        rate, turn = map(min, (rate, turn), _errors_of_step(rule, last))
     of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
     if last is None:
         return rate > _BEGIN * of_life or turn > _BEGIN_OF_PATH * of_path

@@ -7,12 +7,12 @@ import numpy as np
 
 from xcrack.adaptivity.indicators import Indicators
 from xcrack.adaptivity.resolved import resolved_problem
-from xcrack.adaptivity.sizes_2d import growing_sizes, joint_mesh, tip_sizes
+from xcrack.adaptivity.sizes_2d import joint_mesh, tip_sizes
 from xcrack.base.arrays import Floats
 from xcrack.growth.scout import Stage
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.refinement import refine
+from xcrack.mesh.refinement import growing_sizes, refine
 from xcrack.model.problem import Problem
 
 MOST_UNKNOWNS = 300_000

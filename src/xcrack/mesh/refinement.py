@@ -311,6 +311,23 @@ def refine(
     return _split_all_edges(mesh) if cells is None else _cells_given(mesh, np.asarray(cells))
 
 
+_DISTANCES = 2_000_000  # at once, between points and places
+
+
+def growing_sizes(place: Floats, size: Floats, slope: float) -> Callable[[Floats], Floats]:
+    """Sizes of cells at points that grow with the distance from places `(k, d)` by a slope."""
+
+    def size_at(x: Floats) -> Floats:
+        step = max(_DISTANCES // max(len(place), 1), 1)
+        parts = [x[k : k + step] for k in range(0, len(x), step)]
+        return np.concatenate([
+            (size + slope * np.linalg.norm(part[:, None] - place, axis=2)).min(axis=1)
+            for part in parts
+        ])  # fmt: skip
+
+    return size_at
+
+
 def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
     """Bisect cells until their edges are no longer than wanted of the cell in which they lie.
 
@@ -516,4 +533,12 @@ def _facet_parts(mesh: Mesh, facets: Ints) -> Ints:
     return np.asarray(nodes[:, parts].reshape(-1, mesh.dim))
 
 
-__all__ = ["Simplices", "bisect_simplices", "moved_simplices", "refine", "refine_to", "simplices"]
+__all__ = [
+    "Simplices",
+    "bisect_simplices",
+    "growing_sizes",
+    "moved_simplices",
+    "refine",
+    "refine_to",
+    "simplices",
+]

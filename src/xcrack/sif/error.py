@@ -21,7 +21,7 @@ from xcrack.mesh.polygon import distance_to_simplices, points_between
 from xcrack.mesh.refinement import refine
 from xcrack.model.material import isotropic_part
 from xcrack.model.problem import Problem
-from xcrack.sif.accuracy import BESIDE
+from xcrack.sif.accuracy import BESIDE, Domain
 from xcrack.sif.domain_2d import domain_of
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.finer_tips import Places, along_faces, bars_by_finer_cells, has_help
@@ -90,7 +90,7 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
     if factored is None:
         raise ProblemError("no factor was kept: solve(..., error=True) keeps it.")
     space = solutions[0].space
-    tips = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
+    tips = space.tips_of(crack)
     with threads(solutions[0].problem.numerics.threads):
         result = estimate(factored, solutions, [tip_goal(solutions[0], t) for t in tips])
         bend, bend_bar = crack_shape(solutions, result, crack, lambda: on_faces(solutions[0], tips))
@@ -230,9 +230,10 @@ def bars_and_shares(
         cells = len(solutions[0].problem.mesh.cells)
         return [no_bars(shape, general)] * len(sifs), np.zeros((len(sifs), *shape, cells))
     errors = tip_errors(solutions, crack)
-    places = _refusals_of_mesh(solutions[0], crack)
+    tips = solutions[0].space.tips_of(crack)
+    domains = [domain_of(solutions[0], t) for t in tips]
     bars = [
-        _bars(sif, errors, k, places, s, crack)
+        _bars(sif, errors, k, domains, s, crack)
         for k, (sif, s) in enumerate(zip(sifs, solutions, strict=True))
     ]
     return bars, errors.shares
@@ -256,17 +257,9 @@ def _refusal_of_solution(solution: Solution, crack: int) -> str:
     return ""
 
 
-def _refusals_of_mesh(solution: Solution, crack: int) -> list[str]:
-    """Why the mesh at each tip is too coarse for an estimate, or nothing."""
-    tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
-    least = [_least_at_tip(solution, t) for t in tips]
-    return [reason if wanted < size else "" for wanted, size, reason in least]
-
-
-def _least_at_tip(solution: Solution, t: int) -> tuple[float, float, str]:
-    """Cells from which on bars hold at a tip, those there, and what is too small for them."""
-    crack, domain = solution.space.tips[t].crack, domain_of(solution, t)
-    least = _SHORTEST[sum(tip.crack == crack for tip in solution.space.tips)]
+def _least_at_tip(solution: Solution, crack: int, domain: Domain) -> tuple[float, float, str]:
+    """Size of cells from which on bars hold at a tip, that there, and why it is too large."""
+    least = _SHORTEST[len(solution.space.tips_of(crack))]
     length, size = float(solution.lips[crack].weight.sum()), domain.size
     what = {
         length / least: f"the crack is {length / size:.1f} cells long, and bars hold from "
@@ -280,21 +273,22 @@ def _least_at_tip(solution: Solution, t: int) -> tuple[float, float, str]:
 
 
 def _bars(
-    sif: SIF, errors: TipErrors, k: int, places: Sequence[str], solution: Solution, crack: int
+    sif: SIF, errors: TipErrors, k: int, domains: Sequence[Domain], solution: Solution, crack: int
 ) -> KErrors:
     """Bars of one state."""
+    places = [_least_at_tip(solution, crack, domain)[2] for domain in domains]
     bar_of_estimate = _CAUGHT * errors.eta[k]
     shape = errors.bend[k] + errors.rim[k]
     eta = bar_of_estimate + shape
     shares = errors.shares[k].sum(axis=-1)
     parts = (
-        _ETA * _with_room(solution, crack)[:, None] * bar_of_estimate, _SHARES * shares,
+        _ETA * _factors_of_room(domains)[:, None] * bar_of_estimate, _SHARES * shares,
         _SPREAD * sif.spread,
         _AT_KINKS * errors.kinks[k], _AT_INTERFACES * errors.interfaces[k],
         _AT_JUNCTIONS * errors.junctions[k],
     )  # fmt: skip
     bar = np.sqrt(np.sum(np.square(parts), axis=0))
-    bar *= _beside_interfaces(solution, crack)[:, None]
+    bar *= _factors_of_interfaces(domains)[:, None]
     if any(_faces_press(solution, crack, x) for x in kinks_inside(solution, crack)):
         eta = errors.rim[k].copy()
         bar += _MOVED * np.abs(errors.bend[k])
@@ -317,20 +311,14 @@ def _bars(
     return bars_of(eta, bar, reasons, contact)
 
 
-def _with_room(solution: Solution, crack: int) -> Floats:
+def _factors_of_room(domains: Sequence[Domain]) -> Floats:
     """How much more an estimate counts by the room around the tips `(f,)`."""
-    tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
-    domains = [domain_of(solution, t) for t in tips]
     cells = np.array([domain.room / domain.size for domain in domains])
     return np.asarray(1 + _CLOSE * np.minimum(1.0, _CLOSE_ROOM / cells))
 
 
-def _beside_interfaces(solution: Solution, crack: int) -> Floats:
+def _factors_of_interfaces(domains: Sequence[Domain]) -> Floats:
     """How much wider bars are at tips with another material beside them `(f,)`."""
-    tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
-    if not len(solution.problem.elasticity.interfaces):
-        return np.ones(len(tips))
-    domains = [domain_of(solution, t) for t in tips]
     return np.array([1 + _BESIDE * domain.size / domain.interface for domain in domains])
 
 
@@ -451,13 +439,15 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
         return missing
     if solutions[0].space.order == 2:
         return [_of_spread(sif) for sif in sifs]
-    problem = replace(solutions[0].problem, order=2)
-    finer = solve_states(problem, [s.state for s in solutions])
-    fronts = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
-    by_front = [front_intensity(finer, t) for t in fronts]
-    every = [joined_sif([states[k] for states in by_front], 3) for k in range(len(finer))]
+    finer = solve_states(replace(solutions[0].problem, order=2), [s.state for s in solutions])
     reason = "order 2 has other fronts than order 1: refine the mesh along them"
-    return bars_beside(sifs, every, reason)
+    return bars_beside(sifs, _sifs_of_fronts(finer, crack), reason)
+
+
+def _sifs_of_fronts(solutions: Sequence[Solution], crack: int) -> list[SIF]:
+    """K along all fronts of a crack in each state."""
+    by_front = [front_intensity(solutions, t) for t in solutions[0].space.tips_of(crack)]
+    return [joined_sif([states[k] for states in by_front], 3) for k in range(len(solutions))]
 
 
 def without_estimate(solutions: Sequence[Solution], sifs: Sequence[SIF]) -> list[KErrors] | None:
@@ -583,10 +573,8 @@ def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
         finer = solve_states(scene, [s.state for s in solutions])
     except GeometryError as error:
         return [no_bars(sif.K.shape, f"no finer mesh to compare with: {error}") for sif in sifs]
-    fronts = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
-    by_front = [front_intensity(finer, t) for t in fronts]
-    every = [joined_sif([states[k] for states in by_front], 3) for k in range(len(finer))]
-    return bars_beside(sifs, every, "the finer mesh has other fronts: refine the mesh along them")
+    reason = "the finer mesh has other fronts: refine the mesh along them"
+    return bars_beside(sifs, _sifs_of_fronts(finer, crack), reason)
 
 
 def finer_along(problem: Problem, crack: int) -> Mesh:
@@ -677,7 +665,10 @@ def _places_of_finer_cells(solutions: Sequence[Solution]) -> Places | None:
         rubs = any(c is not None and c.shear is not None for c in solution.contact)
         is_whole = [s.number for s in solutions] == list(range(len(solutions)))
         return along_faces(solution) if is_whole or not rubs else None
-    pairs = [(tip.x, *_least_at_tip(solution, t)[:2]) for t, tip in enumerate(space.tips)]
+    pairs = []
+    for t, tip in enumerate(space.tips):
+        wanted, size, _ = _least_at_tip(solution, tip.crack, domain_of(solution, t))
+        pairs.append((tip.x, wanted, size))
     for c in cracks:
         pairs += [(x, room / least, size) for x, room, least, size in _short_parts(solution, c)]
     few = [(x, max(wanted / _MARGIN, size / _FINEST)) for x, wanted, size in pairs if wanted < size]

@@ -17,7 +17,7 @@ from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import XcrackError, XcrackWarning
 from xcrack.mesh.locate import cell_sizes
-from xcrack.mesh.refinement import refine
+from xcrack.mesh.refinement import growing_sizes, refine
 from xcrack.sif.domain_2d import intensity_at_tip
 from xcrack.sif.sif import SIF, KErrors, bars_of, joined_sif
 
@@ -31,7 +31,6 @@ _STAYS = (
     "order 1", "contact by", "the faces press at the kink",
     "parts of the boundary look like chords",
 )  # fmt: skip
-_CHUNK = 2_000_000  # distances at once
 
 Bars = Callable[[Sequence[Solution], Sequence[SIF], int], list[KErrors]]
 
@@ -49,15 +48,6 @@ class Places:
 
     x: Floats
     size: Floats
-
-    def size_at(self, x: Floats) -> Floats:
-        """Wanted size of cells at points `(n,)`."""
-        step = max(_CHUNK // max(len(self.x), 1), 1)
-        parts = [x[k : k + step] for k in range(0, len(x), step)]
-        return np.concatenate([
-            (self.size + _GROWS * np.linalg.norm(part[:, None] - self.x, axis=2)).min(axis=1)
-            for part in parts
-        ])  # fmt: skip
 
 
 def has_help(reason: str) -> bool:
@@ -82,7 +72,8 @@ def finer_solutions(solutions: Sequence[Solution], places: Places) -> list[Solut
         refined_solutions: list[Solution] = factored.around_tips[key]
         return refined_solutions
     problem = solutions[0].problem
-    scene = replace(problem, mesh=refine(problem.mesh, size=places.size_at), order=2)
+    mesh = refine(problem.mesh, size=growing_sizes(places.x, places.size, _GROWS))
+    scene = replace(problem, mesh=mesh, order=2)
     result = solve_states(scene, [s.state for s in solutions], error=True)
     if factored is not None:
         factored.around_tips[key] = result
@@ -117,7 +108,7 @@ def bars_by_finer_cells(
             finer = finer_solutions(solutions, places)
         except XcrackError:
             return None
-        tips = [t for t, tip in enumerate(finer[0].space.tips) if tip.crack == crack]
+        tips = finer[0].space.tips_of(crack)
         by_tip = [intensity_at_tip(finer, t)[0] for t in tips]
     if len(tips) != len(sifs[0].K):
         return None

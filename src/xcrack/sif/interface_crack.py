@@ -122,7 +122,7 @@ def interface_intensity(
             f"interface_intensity: crack = {crack}: the problem has "
             f"{len(solution.space.cuts)} crack(s), numbered from 0."
         )
-    tips = [t for t, tip in enumerate(solution.space.tips) if tip.crack == crack]
+    tips = solution.space.tips_of(crack)
     if not tips:
         raise GeometryError(f"crack {crack} has no tip in the body.")
     rows = [_tip(solution, t, length) for t in tips]

@@ -331,12 +331,13 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
     """
     count = [len(part.K) for part in parts]
 
-    def rows(name: str, *shape: int) -> Floats:
+    def rows(name: str, *shape: int) -> Any:
+        """Values of all parts one behind the other; None where a part has none."""
         values = [getattr(part, name) for part in parts]
-        return lock(np.concatenate([np.zeros((0, *shape)), *values]))
-
-    def rows_if_known(name: str, *shape: int) -> Floats | None:
-        return None if any(getattr(p, name) is None for p in parts) else rows(name, *shape)
+        known = [value for value in values if value is not None]
+        if len(known) < len(values):
+            return None
+        return lock(np.concatenate([np.zeros((0, *shape)), *known]))
 
     return SIF(
         x=rows("x", dim),
@@ -350,9 +351,9 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
         closed=lock(rows("closed").astype(bool)),
         domain_cells=rows("domain_cells"),
         ends=tuple(replace(end, front=f) for f, part in enumerate(parts) for end in part.ends),
-        widened=rows_if_known("widened", dim),
-        E_prime=rows_if_known("E_prime"),
-        nu=rows_if_known("nu"),
+        widened=rows("widened", dim),
+        E_prime=rows("E_prime"),
+        nu=rows("nu"),
     )
 
 

@@ -105,7 +105,7 @@ def stress_intensities(
         elasticity.materials[0].at_tip()  # refuses where K is not defined
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
-    ends = [t for t, tip in enumerate(space.tips) if tip.crack == crack]
+    ends = space.tips_of(crack)
     with threads(solutions[0].problem.numerics.threads):
         by_end = (
             tip_intensities(live, ends)
