@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks import __main__, charts, pareto, runs
-from benchmarks.baselines import conforming_2d, conforming_growth
+from benchmarks.baselines import conforming_2d, conforming_3d, conforming_growth
 from benchmarks.runs import Outcome
 from benchmarks.scenes import bodies, exact_fields, friction, growth, material
 from benchmarks.suites import cases
@@ -264,6 +264,15 @@ def test_baseline_is_accurate():
     K, unknowns = conforming_2d.edge(conforming_2d.Grading(0.01, 0.3, 0.2), (1.0, 0.5))
     assert unknowns < 4000
     assert pytest.approx([1.0, 0.5], rel=2e-4) == K
+
+
+@pytest.mark.gmsh
+@pytest.mark.slow
+def test_baseline_has_K_along_a_front():
+    """Discretisation: .8 % along the front of 9 k unknowns was measured, .6 % in the mean."""
+    pytest.importorskip("skfem")
+    errors = conforming_3d.penny(conforming_2d.Grading(0.15, 0.7, 0.7), 0).errors
+    assert errors["K_I"] < errors["rms"] < 0.012  # a mean is no worse than its parts
 
 
 @pytest.mark.gmsh
