@@ -86,7 +86,7 @@ def test_the_constants_that_matter_are_tied():
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [*PAGES, "CONTRIBUTING.md"])
 def test_files_named_on_pages_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     for name in re.findall(r"`([\w/*.-]+\.py)`", text):
