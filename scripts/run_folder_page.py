@@ -13,7 +13,7 @@ from typing import Any
 
 from xcrack.fatigue.retardation import BlockCycles, OverloadZones
 from xcrack.growth.solves import SolveHistory
-from xcrack.growth.stations import GrowthStations
+from xcrack.growth.stations import CellSizes, GrowthStations
 from xcrack.growth.step import Arrival, Join, Plan, RunState, StepControl, StepError
 from xcrack.growth.validity import Validity
 from xcrack.linalg.engine import SlipField
@@ -156,7 +156,8 @@ def array_names() -> dict[str, list[Row]]:
             *_rows(Join, "join_", (), "each "),
         ],
         "What the run carries along": [
-            *_rows(RunState, "run_", ("settings", "reuse")),
+            *_rows(CellSizes, "run_cells_", (), "optional: "),
+            *_rows(RunState, "run_", ("cells", "settings", "reuse")),
             *_REUSE,
             *_rows(SlipField, "reuse_slip_<crack>_"),
         ],

@@ -1,17 +1,15 @@
 """Growth to a wanted error: lives and paths against exact ones, bars, resuming, refusals."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import xcrack as xc
 from benchmarks.wanted_error import SCENES, against, run, scene
-from xcrack.growth import prepared
-from xcrack.growth import prepared as outgrown
+from xcrack.growth import cells as mesh_cells
+from xcrack.growth.options import run_of as rule_of
 from xcrack.growth.response import respond
-from xcrack.growth.sizes_2d import given_mesh
+from xcrack.mesh.locate import cell_sizes
 from xcrack.runs import run_folder
 from xcrack.verification.exact.plates import PLATE_EDGE
 
@@ -88,7 +86,7 @@ def test_steps_are_chosen_by_the_tolerance():
     ways = np.diff([step.corrected[0].points[-1, 0] for step in many.steps])
     assert ways.max() <= 0.03 * (1 + 1e-9)
     # The first mesh is fine enough for that, on which the crack is four cells long.
-    assert meshes_of(few) == meshes_of(many) == [prepared.fingerprint(given_mesh(strip()))]
+    assert all(step.run.cells is None for step in [*few.steps, *many.steps])
     # The table of the run says which K was used, and how far N is known.
     table = few.table()
     assert (table["best"] == 1).all()
@@ -151,13 +149,13 @@ def two_sheets():
 
 @pytest.mark.slow
 def test_a_tolerance_over_a_meeting_in_space():
-    """The scout goes through it, on the mesh of which the run goes on; no life is compared."""
+    """Cells along the fronts are smaller before and after it; no life is compared."""
     history = xc.collect(
         xc.grow(**run_of(two_sheets(), tolerance=0.04)),
         until=lambda step: len(step.cracks) == 1 and not step.joins,
     )
     assert [len(step.cracks) for step in history.steps] == [2, 2, 1, 1]
-    assert len(meshes_of(history)) == 2
+    assert [step.run.meshes for step in history.steps] == [0, 0, 0, 0]
     assert all(np.isfinite(sif.K).all() for step in history.steps for sif in step.sif[-1])
     met = history.steps[2]
     assert met.joins
@@ -165,11 +163,6 @@ def test_a_tolerance_over_a_meeting_in_space():
 
 
 # Meshes ----------------------------------------------------------------------------------------
-
-
-def meshes_of(history):
-    """Fingerprints of the meshes of a run, each once."""
-    return list(dict.fromkeys(step.run.mesh for step in history.steps))
 
 
 def resumed(folder, given, whole, stops):
@@ -187,13 +180,14 @@ def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path, monkeypatch):
 
     With a stricter rule: so close to the begin all errors together never are above the tolerance.
     """
-    monkeypatch.setattr(outgrown, "_WHOLE", 0.3)
+    monkeypatch.setattr(mesh_cells, "_WHOLE", 0.3)
     given = run_of(strip(5), tolerance=8e-4)
     whole = xc.collect(xc.grow(**given, max_steps=3), tmp_path / "whole")
     assert [step.run.meshes for step in whole.steps] == [0, 1, 1]
     cells = [len(step.solutions[0].problem.mesh.cells) for step in whole.steps]
-    assert cells[0] < cells[1] == cells[2]
-    assert whole.steps[1].error.rate < 0.5 * whole.steps[0].error.rate
+    assert cells[0] < min(cells[1:])
+    # What K may take of the tolerance, for bars that hold for almost all single K.
+    assert whole.steps[1].error.rate < 0.4 / 0.5 * 8e-4 < whole.steps[0].error.rate
     other = resumed(tmp_path / "part", given, whole, (1, 2))
     assert content(tmp_path / "part") == content(tmp_path / "whole")
     assert len(other.mesh.cells) == len(xc.load(tmp_path / "whole").mesh.cells) == cells[-1]
@@ -201,44 +195,28 @@ def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.mission
-def test_mesh_is_refined_again_where_the_scout_was_misled(tmp_path, monkeypatch):
-    """A scout that has seen nothing of the way: a second one goes on from where that shows.
-
-    Without the rules here the run holds its tolerance on the first mesh: most of the life is over
-    when the tip has left the fine cells.
-    """
-    monkeypatch.setattr(outgrown, "_BEGIN", 0.1)
-    asks = outgrown._is_mesh_too_coarse
-    monkeypatch.setattr(
-        outgrown,
-        "_is_mesh_too_coarse",
-        lambda rule, last, step: asks(rule, last, step) or (rule.meshes == 1 and step.index == 6),
-    )
-    real, begins = prepared.scouted, []
-
-    def blind(run, scene, steps_of, begin=0):
-        begins.append(begin)
-        seen = real(run, scene, steps_of, begin)
-        return seen if begin else replace(seen, stages=seen.stages[:1])
-
-    monkeypatch.setattr(prepared, "scouted", blind)
+def test_fine_cells_follow_the_tip(tmp_path, monkeypatch):
+    """They are refined at once; each mesh is that of the begin in cells whose sizes are stored."""
+    monkeypatch.setattr(mesh_cells, "_BEGIN", 0.1)
     given = run_of(tolerance=1e-3)
     whole = xc.collect(xc.grow(**given, max_steps=8), tmp_path / "whole")
-    made = [step.run.meshes for step in whole.steps]
-    assert len(begins) == 2
-    assert begins[0] == 0 < begins[1]
-    assert len(meshes_of(whole)) == 2
-    assert made == [1] * (begins[1] + 1) + [2] * (len(made) - begins[1] - 1)
+    assert {step.run.meshes for step in whole.steps} == {1}
+    names = ("problem", "law", "criterion", "cycle")
+    options = {name: given[name] for name in given if name not in names}
+    rule = rule_of("grow", *[given[name] for name in names], None, options)
+    meshes = [step.solutions[0].problem.mesh for step in whole.steps]
+    assert len({len(mesh.cells) for mesh in meshes}) > 1
+    first = mesh_cells.begin(rule).problem.mesh
+    for step, mesh in zip(whole.steps, meshes, strict=True):
+        cells, tip = step.run.cells, step.cracks[0].points[-1:]
+        again = mesh_cells.bisected(first, cells)
+        assert again.points.tobytes() == mesh.points.tobytes()
+        assert again.cells.tobytes() == mesh.cells.tobytes()
+        assert cell_sizes(mesh, tip)[0] <= 1.25 * cells.size_at(tip)[0]
     assert whole.life_bar.relative <= 1e-3
     assert abs(whole.life / exact_life(whole.cracks[0].points[-1, 0]) - 1) <= 1e-3 + 3 * _TABLE
-    resumed(tmp_path / "part", given, whole, (begins[1], begins[1] + 1, begins[1] + 2))
+    resumed(tmp_path / "part", given, whole, (1, 2, 5))
     assert content(tmp_path / "part") == content(tmp_path / "whole")
-    # Without its second mesh it is made again, from the step before.
-    for mesh in run_folder.mesh_files(tmp_path / "part")[1:]:
-        mesh.unlink()
-    again = xc.resume(tmp_path / "part", **given, max_steps=len(whole.steps) + 1)
-    longer = xc.resume(tmp_path / "whole", **given, max_steps=len(whole.steps) + 1)
-    assert again.table().tobytes() == longer.table().tobytes()
 
 
 # What is stored --------------------------------------------------------------------------------
@@ -251,7 +229,7 @@ def content(folder):
 
 @pytest.mark.parametrize("lost", ["", pytest.param(run_folder.MESH, marks=pytest.mark.slow)])
 def test_resumed_to_the_last_bit(tmp_path, lost):
-    """A run that is killed, also one that has lost its mesh: that is scouted and made again."""
+    """A run that is killed, also one that has lost its mesh, which only pictures are drawn on."""
     given = run_of(tolerance=0.05 if not lost else 1e-3)
     whole = xc.collect(xc.grow(**given, max_steps=4), tmp_path / "whole")
     xc.collect(xc.grow(**given, max_steps=2), tmp_path / "part")
@@ -262,7 +240,7 @@ def test_resumed_to_the_last_bit(tmp_path, lost):
     assert content(tmp_path / "part") == content(tmp_path / "whole")
     stored = xc.load(tmp_path / "whole")
     assert stored.life_bar.total == whole.life_bar.total
-    assert len(stored.mesh.cells) == len(whole.steps[0].solutions[0].problem.mesh.cells)
+    assert len(stored.mesh.cells) == len(whole.steps[-1].solutions[0].problem.mesh.cells)
 
 
 def test_bars_between_solves_are_foretold(tmp_path):

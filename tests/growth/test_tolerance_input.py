@@ -1,14 +1,12 @@
 """What a tolerance cannot be given with, in 2D and 3D: a clear error, and no finished step lost."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth import prepared as outgrown
-from xcrack.growth.corridor import Ways, corridor
+from xcrack.growth import cells as mesh_cells
 
 STEEL = xc.Isotropic(210e3, 0.3)
 LAW = xc.paris(C=1e-3, m=3.0)
@@ -88,8 +86,8 @@ def test_nothing_is_lost_where_a_later_mesh_cannot_be_made(tmp_path, monkeypatch
     def fails(*args):
         raise xc.MeshError("curves['hole'] takes the point elsewhere")
 
-    monkeypatch.setattr(outgrown, "finer", fails)
-    monkeypatch.setattr(outgrown, "_WHOLE", 0.3)
+    monkeypatch.setattr(mesh_cells, "finer", fails)
+    monkeypatch.setattr(mesh_cells, "_WHOLE", 0.3)
     mesh = xc.box((0.0, -1.0), (1.0, 1.0), (5, 10))
     pull = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
     crack = xc.line_crack([(-0.1, 0.003), (0.2, 0.003)])
@@ -99,13 +97,3 @@ def test_nothing_is_lost_where_a_later_mesh_cannot_be_made(tmp_path, monkeypatch
         xc.collect(given, tmp_path)
     assert len(caught.value.history.steps) == len(xc.load(tmp_path).steps) == 1
     assert "1 finished steps are in" in caught.value.__notes__[-1]
-
-
-def test_a_corridor_is_not_finer_than_its_unknowns_allow():
-    """Sizes that a tiny step would ask for (1e-14 of the body) make no array that does not fit."""
-    first = np.zeros(1, dtype=np.int64)
-    ways = Ways(np.zeros((1, 2)), np.array([[1.0, 0]]), first, first, [first])
-    scouted = SimpleNamespace(stages=[SimpleNamespace(places=np.zeros((1, 2)))])
-    narrow = corridor(scouted, ways, first, [np.full(1, 1e-14)], 3000)
-    assert len(narrow.x) < 3000
-    assert narrow.size.min() == pytest.approx(3 / 3000)

@@ -4,7 +4,6 @@ The first is smaller at tips and kinks; in the next ones cells that contribute m
 bisected.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -171,8 +170,7 @@ def next_mesh(current: Indicators, tolerance: float, aim: float, most: int) -> M
     each = current.solutions[0].space.n_dof / len(mesh.cells)
     for share in aim * 2.0 ** np.arange(1 + _GENTLER):
         target = tolerance * scale * share
-        ratio = size_ratios(current.shares, current.bar.ravel(), target, _ORDER, mesh.dim)
-        ratio = np.minimum(ratio, at_coarse_tips(current))
+        ratio = cell_ratios(current, target, 1.0)
         fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
         while len(fine.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
             largest = np.argsort(current.shares.max(axis=0, initial=0.0))[
@@ -203,35 +201,25 @@ def _bent_cracks(given: Indicators) -> tuple[int, ...]:
     return tuple(c for c in given.pressed if len(kink_numbers(given.problem.placed[c].points)))
 
 
-def joint_mesh(indicators: Sequence[Indicators], target: Sequence[float], aim: float) -> Mesh:
-    """A finer mesh, by the cells' contributions to the bars of all scenes.
+def cell_ratios(current: Indicators, target: float, aim: float) -> Floats:
+    """Size of each cell in a finer mesh over its size in this one `(m,)`.
 
     Parameters
     ----------
-    indicators : sequence of Indicators
-        On the same mesh.
-    target : sequence of float, stress · √length
-        Half-width that K of each is to have.
+    current : Indicators
+    target : float, stress · √length
+        Half-width that K is to have.
     aim : float
         Share of it that bars of the next mesh are foretold to have.
     """
-    mesh = indicators[0].problem.mesh
-    shares = np.concatenate(
-        [current.shares / w for current, w in zip(indicators, target, strict=True)]
-    )
-    bar = np.concatenate(
-        [current.bar.ravel() / w for current, w in zip(indicators, target, strict=True)]
-    )
-    ratio = size_ratios(shares, bar, aim, _ORDER, mesh.dim)
-    for current in indicators:
-        ratio = np.minimum(ratio, at_coarse_tips(current))
-    return refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
+    ratio = size_ratios(current.shares, current.bar.ravel(), aim * target, _ORDER, 2)
+    return np.minimum(ratio, at_coarse_tips(current))
 
 
 __all__ = [
     "at_coarse_tips",
+    "cell_ratios",
     "first_mesh",
-    "joint_mesh",
     "next_mesh",
     "size_ratios",
     "tip_sizes",

@@ -22,6 +22,7 @@ from xcrack.fatigue.rainflow import turning_points
 from xcrack.fatigue.retardation import Retardation, RetardationSets, willenborg
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.response import Respond
+from xcrack.growth.stations import CellSizes
 from xcrack.model.problem import LoadLevel, Problem
 
 _LEAST = 1e-6  # relative error of a life that cells and steps can be held to
@@ -67,10 +68,10 @@ class GrowthRule:
     threshold, retardation, solver, response, load_program, K_c, link_up, stop_at_interface, \
     max_steps, max_cycles, max_size, progress
         As of `grow`.
-    scouts : bool
-        It is the scout of a run with a tolerance: nothing is estimated.
+    cells : CellSizes, optional
+        Of the mesh, where a tolerance has asked for smaller ones than it began with.
     meshes : int
-        Number of meshes that a tolerance has made so far.
+        How often it has done so.
 
     Raises
     ------
@@ -116,7 +117,7 @@ class GrowthRule:
     progress: Annotated[bool | str, Choice((True, False, "always"), _PROGRESS)] = field(
         default=True, metadata=_STOPS
     )
-    scouts: bool = field(default=False, metadata=_STOPS)
+    cells: CellSizes | None = field(default=None, metadata=_STOPS)
     meshes: int = field(default=0, metadata=_STOPS)
 
     def __post_init__(self) -> None:
@@ -236,19 +237,19 @@ class GrowthRule:
     @property
     def estimates(self) -> bool:
         """Whether K has error bars, which its growth is held against."""
-        return self.tolerance is not None and not self.scouts
+        return self.tolerance is not None
 
     @property
     def toughness(self) -> float | None:
-        """Toughness at which the run ends: its own, or that of the material; a scout has none."""
-        if self.scouts or self.K_c is not None:
+        """Toughness at which the run ends: its own, or that of the material."""
+        if self.K_c is not None:
             return self.K_c
         return self.problem.elasticity.material.K_c
 
     def toughness_at(self, x: Floats) -> Floats:
         """Toughness at which the run ends, of the material at each point `(n,)`; inf without."""
-        if self.scouts or self.K_c is not None:
-            return np.full(len(x), np.inf if self.K_c is None else self.K_c)
+        if self.K_c is not None:
+            return np.full(len(x), self.K_c)
         return self.problem.elasticity.toughness_at(x)
 
     def _check_tolerance(self) -> None:

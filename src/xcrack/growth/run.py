@@ -18,6 +18,7 @@ from xcrack.fatigue.law_sets import LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_life, alarms_of_step, validity_of
+from xcrack.growth.cells import at_step, bars_are_foretold, begin, follow, replanned
 from xcrack.growth.ends import (
     beyond_end,
     cannot_go_on,
@@ -48,7 +49,6 @@ from xcrack.growth.levels import (
     states_and_levels,
 )
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
-from xcrack.growth.prepared import bars_are_foretold, fingerprint, prepared, replanned
 from xcrack.growth.progress import Progress, WarningLog
 from xcrack.growth.rates import check_choice, rates_of, warn_of_left_out
 from xcrack.growth.response import Response
@@ -64,7 +64,6 @@ from xcrack.growth.step import (
 )
 from xcrack.growth.uncertainty import add_K_error, best_K, foretold_bars, shortfall
 from xcrack.linalg.engine import SolverState
-from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF
 
@@ -104,13 +103,13 @@ def grow(
         Largest advance of any tip in a step.
     tolerance : float, optional
         Wanted error of the life, relative, and of the path, over the length grown: in place of `da`
-        and `cycles`, which are upper bounds then. The mesh may be coarse: at the first step whose
-        error bars ask for it a scout grows the cracks from there in long steps, and where they
-        run, cells become small enough for K; once more where the path leaves these cells. Each
-        step is as long as its estimated error allows. Solved at order
-        2; growth follows the best K where its error bar is known, K elsewhere. `History.life_bar`
-        says what came of it. The scout knows nothing of `max_steps`, `max_cycles`, `K_c` and
-        `until`: whatever stops the run, and resumes it, the meshes are the same.
+        and `cycles`, which are upper bounds then. The mesh may be coarse: from the first step on
+        whose error bars ask for it, cells are smaller where they contribute most, and those at the
+        ends of the cracks move on with these. Each step is as long as its estimated error allows.
+        Solved at order 2; growth follows the best K where its error bar is known, K elsewhere.
+        `History.life_bar` says what came of it. The mesh of a step follows from the one as given
+        and from what is stored with the step: whatever stops the run, and resumes it, the meshes
+        are the same.
     max_unknowns : int, optional
         Most unknowns of the mesh that a tolerance chooses; 300 000 if omitted.
     cycles : float, optional
@@ -201,7 +200,7 @@ def grow(
     analysis of all load states and the life of ten steps is good to a few tenths of a per cent.
 
     Of a tolerance of the life, six tenths are for the steps and four for K: where the bars of K ask
-    for more, cells become smaller until those of a few stages of the way are as wanted.
+    for more, cells become smaller until those of the step are as wanted, or nearly so.
     Steps are controlled by their estimated error (proportional and integral: Gustafsson 1991, ACM
     Trans. Math. Softw. 17, 533).
 
@@ -226,20 +225,20 @@ def first_step(rule: GrowthRule) -> Step:
     return _solved_step(rule, rule.problem, None, SolverState(), {})[0]
 
 
-def growth_steps(
-    rule: GrowthRule, done: Sequence[Step] = (), meshes: Sequence[Mesh] = ()
-) -> Generator[Step, None, str]:
+def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow the steps that are done.
 
-    Of one with a tolerance, `meshes` are those that it has had. Returns why the run ended.
+    Returns why the run ended.
     """
     check_choice(rule.law, rule.cycle.ratio)
     settings = rule.settings  # before a law is called that may change what it reads
     done = steps_to_go_on_from(rule, done)
-    asked, last = rule, done[-1] if done else None
-    ended = ""
+    last, ended = done[-1] if done else None, ""
     if rule.estimates:
-        rule = prepared(rule, growth_steps, done, meshes)
+        rule = begin(rule)
+    begun = rule  # on the mesh of no step in particular
+    if rule.estimates and last is not None:
+        rule = at_step(begun, run_state(last))
     notices, progress = WarningLog(), Progress(rule)
     kink, is_torn = "", any(_alarm_of_segments(rule, step) for step in done)
     try:
@@ -249,7 +248,7 @@ def growth_steps(
                 own = len(messages)
                 other = None
                 if not nothing_grows(rule, first):  # where nothing does, no mesh is fine enough
-                    other = replanned(asked, rule, growth_steps, None, first)
+                    other = replanned(begun, rule, None, first)
                 if other is not None:
                     rule = other[0]
                     del messages[:own]  # of a mesh that nobody has
@@ -271,25 +270,28 @@ def growth_steps(
             kink = kink or _warned_of_kink(rule, last)
             with notices.watch(last.index + 1) as messages:
                 cut = last if rule.max_size is None else _cut_at_size(rule, last)
-                next_step, reuse, ended = _step_after(rule, cut, reuse)
+                ahead = rule if rule.cells is None else follow(begun, rule, cut)
+                reuse = reuse if ahead is rule else reuse.without_matrices()
+                next_step, reuse, ended = _step_after(ahead, cut, reuse)
                 if next_step is None:
                     break
-                is_torn = is_torn or _warn_of_mode_III(rule, next_step)
+                is_torn = is_torn or _warn_of_mode_III(ahead, next_step)
                 own = len(messages)
-                other = replanned(asked, rule, growth_steps, cut, next_step)
+                other = replanned(begun, ahead, cut, next_step)
                 if other is not None:
                     del messages[:own]  # of a step that nobody has
                 else:
                     if cut is not last:
                         next_step = _with_mark(next_step)
                     next_step, reuse, ended = _cut_at_end(
-                        rule, cut, (next_step, reuse, ended), messages
+                        ahead, cut, (next_step, reuse, ended), messages
                     )
-                    next_step = _with_validity(rule, next_step)
+                    next_step = _with_validity(ahead, next_step)
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
                 rule, last = other[0], _with_plan(other[0], other[1] or last)
                 continue
+            rule = ahead
             last = replace(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
@@ -297,7 +299,7 @@ def growth_steps(
                 break
     finally:
         notices.summarise()
-        if ended and last is not None and not rule.scouts:
+        if ended and last is not None:
             alarm = alarm_of_life(rule, last, ended)
             if alarm is not None:
                 warn(str(alarm))
@@ -448,8 +450,6 @@ def _warned_of_kink(rule: GrowthRule, step: Step) -> str:
 
 def _with_validity(rule: GrowthRule, step: Step) -> Step:
     """A step with how far elasticity holds at it; warns of what is beyond its limit."""
-    if rule.scouts:
-        return step
     if not step.has_left:  # by the material alone: a K_c of the run only says where it ends
         K_c = rule.problem.elasticity.material.K_c
         step = replace(step, validity=validity_of(rule, step, K_c))
@@ -601,7 +601,7 @@ def _solved_step(
             settings,
             handed_on.without_matrices(),
             radius,
-            fingerprint(problem.mesh) if rule.estimates else "",
+            rule.cells,
             rule.meshes,
         ),
     )

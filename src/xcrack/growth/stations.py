@@ -203,7 +203,47 @@ def _identities_at(end: Ints, place: Floats, points: Sequence[Floats]) -> list[i
     return result
 
 
+@dataclass(frozen=True, eq=False)
+class CellSizes:
+    """Cells that the bars of a run ask for, smaller than those of the mesh that it begins with.
+
+    Attributes
+    ----------
+    x : (n, d) array, length
+        Places.
+    size : (n,) array, length
+        Longest edges of cells there.
+    moves : (n,) array of bool
+        At an end of a crack, with which the size moves on; the others stay.
+    """
+
+    x: Floats
+    size: Floats
+    moves: Bools
+
+    def size_at(self, x: Floats) -> Floats:
+        """Of points `(k, d)`: that of the nearest place that moves; inf where none does."""
+        if not self.moves.any():
+            return np.full(len(x), np.inf)
+        return np.asarray(self.size[self.moves][cKDTree(self.x[self.moves]).query(x)[1]])
+
+    def with_ends(self, x: Floats, size: Floats) -> "CellSizes":
+        """With sizes `(k,)` at the ends `(k, d)` of the cracks of another step."""
+        stays = ~self.moves
+        fixed = CellSizes(self.x[stays], self.size[stays], self.moves[stays])
+        return fixed.with_places(CellSizes(x, size, np.ones(len(x), dtype=bool)))
+
+    def with_places(self, other: "CellSizes") -> "CellSizes":
+        """With the places of another one too."""
+        return CellSizes(
+            np.concatenate([self.x, other.x]),
+            np.concatenate([self.size, other.size]),
+            np.concatenate([self.moves, other.moves]),
+        )
+
+
 __all__ = [
+    "CellSizes",
     "GrowthStations",
     "Identities",
     "PerCrack",

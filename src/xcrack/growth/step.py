@@ -15,7 +15,7 @@ from xcrack.crack.meetings import LEAST
 from xcrack.fatigue.criteria import clipped_K, local_equivalent_K
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.solves import SolveHistory
-from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
+from xcrack.growth.stations import CellSizes, GrowthStations, Identities, PerCrack, directions
 from xcrack.growth.validity import Validity
 from xcrack.linalg.engine import SolverState
 from xcrack.sif.sif import SIF
@@ -269,10 +269,10 @@ class RunState:
         What the next solve starts from, without matrices.
     radius : float, length, or None
         Enriched radius of the first step.
-    mesh : str
-        Fingerprint of the mesh of a run with a tolerance; empty where none was asked for.
+    cells : CellSizes, optional
+        Of the mesh of a run with a tolerance; None where it is the one that the run begins with.
     meshes : int
-        Number of meshes that the tolerance has made; 0 on the one as given.
+        How often a tolerance has asked for smaller cells.
     cut : bool
         The step is shorter than planned, as the run ends at it: where it goes on after all, with
         other limits, the step is computed again.
@@ -281,7 +281,7 @@ class RunState:
     settings: Mapping[str, str]
     reuse: SolverState
     radius: float | None = None
-    mesh: str = ""
+    cells: CellSizes | None = None
     meshes: int = 0
     cut: bool = False
 

@@ -23,7 +23,7 @@ _FAST = 0.5  # of the largest rate: places that count for the error of life
 _REMEDY = {
     "steps": "The first step is known better once a second one is done; later ones are as short as "
     "cells allow: refine the mesh along the way (xc.refine).",
-    "K": "Give a smaller tolerance or a larger max_unknowns: the mesh was chosen for a few stages "
+    "K": "Give a smaller tolerance or a larger max_unknowns: the cells were chosen for a few steps "
     "of the way only.",
     "contact": "Refine the mesh along the faces that touch (xc.refine).",
     "no bar": "The steps at which K has no error bar count in full.",

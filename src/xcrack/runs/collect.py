@@ -131,8 +131,7 @@ def resume(
     keep_solutions
         As they were given to `grow` and `collect`.
     tolerance, max_unknowns
-        As they were given to `grow`. The mesh that a tolerance chose is read from the folder; where
-        it is lost it is made again.
+        As they were given to `grow`.
     K_c, link_up, stop_at_interface, max_steps, max_cycles, max_size
         Rules that stop a run may be other ones than before.
 
@@ -177,14 +176,10 @@ def resume(
         run_folder.write_header(folder, header)
         steps = steps_to_go_on_from(run, stored.steps)
         collection.taken.extend(steps)
-        first = stored.steps[0].run if stored.steps else None
-        collection.store = RunStore(folder, check, header, "" if first is None else first.mesh)
-        meshes: list[Mesh] = []
+        collection.store = RunStore(folder, check, header)
         if run.tolerance is not None and stored.steps:
-            every = map(run_folder.read_mesh_file, run_folder.mesh_files(folder))
-            meshes = [mesh for mesh in every if mesh is not None]
-            collection.mesh = _last_mesh(folder, stored.steps) or problem.mesh
-        return collection.of(growth_steps(run, steps, meshes))
+            collection.mesh = run_folder.read_mesh_file(folder / run_folder.MESH) or problem.mesh
+        return collection.of(growth_steps(run, steps))
 
 
 def load(path: str | Path) -> Any:
@@ -232,14 +227,8 @@ def load(path: str | Path) -> Any:
             "computes the others again."
         )
     ended = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
-    return History(stored.steps, ended, folder, _last_mesh(folder, stored.steps))
-
-
-def _last_mesh(folder: Path, steps: Sequence[Step]) -> Mesh | None:
-    """The mesh of the last step of a run, where it is stored."""
-    names = [step.run.mesh for step in steps if step.run is not None]
-    other = bool(names) and names[-1] != names[0]
-    return run_folder.read_mesh_file(run_folder.mesh_path(folder, names[-1] if other else ""))
+    mesh = run_folder.read_mesh_file(folder / run_folder.MESH)
+    return History(stored.steps, ended, folder, mesh)
 
 
 @dataclass
@@ -293,8 +282,7 @@ class Collector:
                 raise ProblemError(
                     f"collect: {value_text(step)} is not a Step: give what grow returns."
                 )
-            has_own = step.run is not None and bool(step.run.mesh)
-            if step.solutions and (self.mesh is None or has_own):
+            if step.solutions:
                 self.mesh = step.solutions[0].problem.mesh
             self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
             if self.store is not None:

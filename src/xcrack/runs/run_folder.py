@@ -9,7 +9,7 @@ import contextlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,6 @@ HEADER = "run.json"
 STEPS = "steps"  # folder of the run in that of the results of a case file
 MESH = "mesh.npz"
 FORMAT = 3
-_OTHER_MESH = "mesh_{}.npz"  # one that growth has asked for, by its fingerprint
 _STEP = re.compile(r"step_(\d{5,})\.npz")
 
 
@@ -164,17 +163,6 @@ def step_path(folder: Path, index: int) -> Path:
     return folder / f"step_{index:05d}.npz"
 
 
-def mesh_path(folder: Path, name: str) -> Path:
-    """File of the first mesh, or of the one with a fingerprint."""
-    return folder / (_OTHER_MESH.format(name) if name else MESH)
-
-
-def mesh_files(folder: Path) -> list[Path]:
-    """All files of meshes: the first one, and others."""
-    with system_errors("the run cannot be read from", folder, error=ProblemError):
-        return [folder / MESH, *sorted(folder.glob(_OTHER_MESH.format("*")))]
-
-
 def read_mesh_file(path: Path) -> Mesh | None:
     """A mesh of a run; None where it is not there, or not whole."""
     arrays = read_arrays(path.read_bytes()) if path.is_file() else None
@@ -277,7 +265,7 @@ def sweep(folder: Path) -> None:
     with system_errors("left over files cannot be removed from", folder, error=ProblemError):
         for path in folder.glob(f".*{PART}"):
             name = path.name.removeprefix(".")
-            if name.startswith((f"{HEADER}.", f"{lock.NAME}.")) or _STEP.match(name):
+            if name.startswith((f"{HEADER}.", f"{MESH}.", f"{lock.NAME}.")) or _STEP.match(name):
                 path.unlink(missing_ok=True)
 
 
@@ -288,9 +276,7 @@ class RunStore:
     folder: Path
     check: Callable[[], None]  # raises where another process has taken over
     header: RunHeader | None = None
-    first: str = ""  # fingerprint of the mesh that a run with a tolerance has begun with
-    # Written by this process: a killed one may have left half of them.
-    meshes: set[Path] = field(default_factory=set)
+    mesh: Mesh | None = None  # written last by this process
 
     def write(self, step: Step) -> None:
         """Write a step; afterwards it is on disk as a whole."""
@@ -300,16 +286,12 @@ class RunStore:
             _make_room(self.folder)
             self.header = RunHeader(settings, versions())
             write_header(self.folder, self.header)
-        name = "" if step.run is None else step.run.mesh
-        if step.index == 0:
-            self.first = name
-        path = mesh_path(self.folder, "" if name == self.first else name)
         mesh = getattr(step.solutions[0].problem, "mesh", None) if step.solutions else None
-        if path not in self.meshes and isinstance(mesh, Mesh):
+        if isinstance(mesh, Mesh) and mesh is not self.mesh:
             # A run does without it: where the system refuses, it is left out.
             with contextlib.suppress(OSError):
-                path.write_bytes(packed_arrays(arrays_of_mesh(mesh)))
-            self.meshes.add(path)
+                write_whole(self.folder / MESH, packed_arrays(arrays_of_mesh(mesh)))
+            self.mesh = mesh
         write_step(self.folder, step, self.header)
 
     def end(self, ended: str) -> None:
@@ -322,8 +304,6 @@ class RunStore:
 def _make_room(folder: Path) -> None:
     """Move aside what stands in the place of the files of a new run."""
     files = step_files(folder)[::-1]
-    if files:
-        files += mesh_files(folder)[1:]
     header = folder / HEADER
     if header.exists() and (files or not _is_header(folder)):
         files.append(header)
@@ -348,8 +328,6 @@ __all__ = [
     "RunStore",
     "StoredSteps",
     "folder_of_steps",
-    "mesh_files",
-    "mesh_path",
     "move_aside",
     "read_header",
     "read_mesh_file",

@@ -412,7 +412,7 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
             tuple(arrays["identity_name"].tolist()),
         )
     run = None
-    if "run_mesh" in arrays:
+    if "run_meshes" in arrays:
         run = unpack(RunState, "run", arrays, settings=settings or {}, reuse=_unpack_reuse(arrays))
     validity = None
     if "validity_number" in arrays:

@@ -1,0 +1,475 @@
+"""The mesh of a run with a tolerance: as given, and smaller cells where the bars of K ask for them.
+
+Each step is solved on the mesh that the run begins with, bisected to sizes that are stored with the
+step: around the ends of its cracks, with which they move, and around a few places that stay.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from xcrack.adaptivity.indicators import Indicators, indicators_of
+from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.adaptivity.sizes_2d import cell_ratios, tip_sizes
+from xcrack.adaptivity.sizes_3d import first_mesh
+from xcrack.base.errors import (
+    GeometryError,
+    ProblemError,
+    XcrackError,
+    collected_warnings,
+    warn,
+)
+from xcrack.crack.crack import kink_numbers
+from xcrack.crack.measures import exit_ahead
+from xcrack.fatigue.checks import law_exponent
+from xcrack.fatigue.cycle import Cycle
+from xcrack.growth.options import GrowthRule
+from xcrack.growth.stations import CellSizes
+from xcrack.growth.step import RunState, Step, plan_of, run_state, solves_of
+from xcrack.growth.step_length import (
+    PATH,
+    REJECTED,
+    STEPS,
+    cell_for,
+    first_length,
+    next_length,
+)
+from xcrack.growth.tips import LONGER_FIRST
+from xcrack.growth.uncertainty import TOGETHER
+from xcrack.mesh.locate import cell_sizes
+from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.polygon import graded_sizes
+from xcrack.mesh.refinement import growing_sizes, refine
+from xcrack.model.problem import Problem
+
+# The mesh that a run begins with, and that of each step.
+
+_COARSEST = 1.3  # times the size that sees crack and room: error bars can just be had there
+_SLOPE = 0.25  # growth of cells with the distance from a tip, on the first mesh
+_LARGER = 1.25  # cells at an end over the size wanted there, from which on the mesh follows it
+
+
+def begin(rule: GrowthRule) -> GrowthRule:
+    """A run on the mesh that it begins with: as given, where error bars can be had on it.
+
+    Else it is finer at tips and fronts.
+
+    Raises
+    ------
+    ProblemError
+        That has more unknowns than the run may have.
+    """
+    mesh = _MESHES[rule.problem.mesh.dim].first_mesh(rule.problem)
+    least = mesh.dim * (mesh.n_points + len(mesh.edges))
+    if rule.max_unknowns is not None and least > rule.max_unknowns:
+        raise ProblemError(
+            f"grow: max_unknowns = {rule.max_unknowns}, and the first mesh, on which cracks are a "
+            f"few cells long, has {least} at least: allow more, or give a coarser mesh."
+        )
+    return replace(rule, problem=replace(rule.problem, mesh=mesh, order=2))
+
+
+def at_step(begun: GrowthRule, state: RunState) -> GrowthRule:
+    """A run on the mesh of one of its steps."""
+    return _with_cells(begun, state.cells, state.meshes)
+
+
+def bisected(mesh: Mesh, cells: CellSizes) -> Mesh:
+    """A mesh in cells of sizes that grow with the distance from some places."""
+    return refine(mesh, size=graded_sizes([cells.x], [cells.size]))
+
+
+def _with_cells(begun: GrowthRule, cells: CellSizes | None, meshes: int) -> GrowthRule:
+    if cells is not None:
+        mesh = bisected(begun.problem.mesh, cells)
+        begun = replace(begun, problem=replace(begun.problem, mesh=mesh))
+    return replace(begun, cells=cells, meshes=meshes)
+
+
+def follow(begun: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
+    """The run on the mesh of the next step, whose ends are where the plan of the last one leads.
+
+    Parameters
+    ----------
+    begun, rule : GrowthRule
+        On the mesh that it begins with, and on that of the last step.
+    last : Step
+    """
+    cells = rule.cells
+    if cells is None or not cells.moves.any():
+        return rule
+    try:
+        x = replace(rule.problem, cracks=plan_of(last).cracks).stations.x
+    except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
+        return rule
+    if not len(x):
+        return rule
+    size = cells.size_at(x)
+    if (cell_sizes(rule.problem.mesh, x) <= _LARGER * size).all():
+        return rule
+    return _with_cells(begun, cells.with_ends(x, size), rule.meshes)
+
+
+def _first_mesh_2d(problem: Problem) -> Mesh:
+    """The mesh as it was given, where cracks are long enough in it; else finer at the tips."""
+    problem = resolved_problem(problem)
+    place, size = tip_sizes(problem)
+    if (cell_sizes(problem.mesh, place) <= _COARSEST * size).all():
+        return problem.mesh
+    return refine(problem.mesh, size=growing_sizes(place, size, _SLOPE))
+
+
+# Sizes by the bars of K at one step.
+
+SHARE = 0.4  # of the tolerance: what K may take
+_LEAST_EXPONENT = 2.0  # of the law, in the error of life; directions err by twice that of K_II
+_FORETOLD = 4.0  # times the wanted bar: from there the next mesh need not be looked at again
+_MOST_UNKNOWNS = 300_000
+
+
+def finer(begun: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
+    """The run on a mesh on which the bars of K at a step are as wanted, or nearly so.
+
+    Parameters
+    ----------
+    begun, rule : GrowthRule
+        On the mesh that it begins with, and on that of the step.
+    step : Step
+    """
+    dimension, start = _MESHES[rule.problem.mesh.dim], perf_counter()
+    most = rule.max_unknowns or _MOST_UNKNOWNS
+    tolerance = float(rule.tolerance or 0.0)
+    exponent = law_exponent(rule.law, np.concatenate(step.dK_eq), np.concatenate(step.R))
+    wanted = SHARE / TOGETHER * tolerance / max(exponent, _LEAST_EXPONENT)
+    meshes = rule.meshes + 1
+    for number in range(dimension.rounds):
+        now = _bars_of_cracks(rule, step)
+        if now is None:
+            break
+        error, unknowns = dimension.error(now), now.solutions[0].space.n_dof
+        _tell(
+            rule, f"mesh {number}: {unknowns} unknowns, K within {error:.1e}, wanted {wanted:.1e}",
+            start,
+        )  # fmt: skip
+        if error <= wanted:
+            break
+        other = _with_cells(begun, dimension.cells(rule.cells, now, wanted * now.scale), meshes)
+        before, after = len(rule.problem.mesh.cells), len(other.problem.mesh.cells)
+        if unknowns * after > most * before:
+            warn(
+                f"grow: the mesh that tolerance = {tolerance:g} asks for would have more than "
+                f"{most} unknowns: growth goes on with {unknowns}, on which K is known to "
+                f"{error:.1e} of its largest value, where {wanted:.1e} was wanted. Allow more with "
+                "max_unknowns; life_bar says what it costs."
+            )
+            return replace(rule, meshes=_MOST)
+        rule = other
+        if error <= _FORETOLD * wanted or after == before:
+            break
+    return replace(rule, meshes=meshes)
+
+
+def _bars_of_cracks(rule: GrowthRule, step: Step) -> Indicators | None:
+    """K of the cracks of a step with its bars; None where the mesh has none."""
+    with collected_warnings([]):  # they come again in the run
+        try:
+            scene = replace(rule.problem, cracks=step.cracks)
+            return indicators_of(scene, rule.cycle.load_states)
+        except XcrackError:
+            return None
+
+
+def _tell(rule: GrowthRule, line: str, start: float) -> None:
+    if rule.progress == "always" or (rule.progress and sys.stderr.isatty()):
+        print(f"{line}, {perf_counter() - start:.2g} s", file=sys.stderr)
+
+
+_AIM = 0.7  # of the wanted half-widths
+_SMALLER = 0.85  # ratio of sizes from which on a cell is worth a place
+_AT_TIP, _AT_KINK = 4.0, 2.0  # cells: what belongs to a tip and moves with it, to a kink and stays
+
+
+def _error_2d(now: Indicators) -> float:
+    """Largest half-width of K over the largest K, of those that are known."""
+    scale = now.scale_of(now.K[np.isfinite(now.K)])
+    return float(now.bar[np.isfinite(now.bar)].max(initial=0.0)) / scale if scale > 0 else 0.0
+
+
+def _cells_2d(cells: CellSizes | None, now: Indicators, target: float) -> CellSizes:
+    """Sizes at the tips and at other cells that contribute much to the bars."""
+    mesh, tips = now.problem.mesh, now.problem.stations.x
+    ratio = cell_ratios(now, target, _AIM)
+    centre, wanted = mesh.points[mesh.cells].mean(axis=1), ratio * mesh.cell_size
+    is_smaller = ratio < _SMALLER
+    size = cell_sizes(mesh, tips)
+    distance = np.linalg.norm(centre[:, None] - tips, axis=2)
+    is_at_tip = distance <= _AT_TIP * size
+    bends = [crack.points[kink_numbers(crack.points)] for crack in now.problem.placed]
+    kinks = np.concatenate([np.zeros((0, 2)), *bends])
+    from_kinks = np.linalg.norm(centre[:, None] - kinks, axis=2)
+    is_at_kink = (from_kinks <= _AT_KINK * cell_sizes(mesh, kinks)).any(axis=1)
+    is_at_tip &= ~is_at_kink[:, None] | (distance <= size)
+    if cells is not None and cells.moves.any():
+        size = np.minimum(size, cells.size_at(tips))
+    for k, own in enumerate((is_at_tip & is_smaller[:, None]).T):
+        size[k] = min(size[k], wanted[own].min(initial=np.inf))
+    stays = is_smaller & ~is_at_tip.any(axis=1)
+    fixed = CellSizes(centre[stays], wanted[stays], np.zeros(int(stays.sum()), dtype=bool))
+    return (fixed if cells is None else cells.with_places(fixed)).with_ends(tips, size)
+
+
+_POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
+_FINER = 1.6  # times finer in a round
+
+
+def _error_3d(now: Indicators) -> float:
+    """Mean half-width of K along the fronts of all states, over the largest K."""
+    good = np.isfinite(now.bar).all(axis=1)
+    scale = now.scale_of(now.K[good])
+    return float(now.bar[good].max(axis=1).mean()) / scale if scale > 0 else 0.0
+
+
+def _cells_3d(cells: CellSizes | None, now: Indicators, target: float) -> CellSizes:
+    """Sizes along the fronts, each as much smaller as the mean of the bars asks for."""
+    stations, mesh = now.problem.stations, now.problem.mesh
+    over = _error_3d(now) * now.scale / target if target > 0 else 1.0
+    size = np.array(cell_sizes(mesh, stations.x))
+    for crack in np.unique(stations.crack):
+        own = stations.crack == crack
+        size[own] = np.median(size[own])
+    size /= np.clip(over, 1.0, _FINER**_POWER) ** (1 / _POWER)
+    none = CellSizes(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
+    return (none if cells is None else cells).with_ends(stations.x, size)
+
+
+@dataclass(frozen=True)
+class _Dimension:
+    """What is another thing in 2D and in 3D."""
+
+    first_mesh: Callable[[Problem], Mesh]
+    error: Callable[[Indicators], float]
+    cells: Callable[[CellSizes | None, Indicators, float], CellSizes]
+    rounds: int
+
+
+_MESHES = {
+    2: _Dimension(_first_mesh_2d, _error_2d, _cells_2d, 6),
+    3: _Dimension(first_mesh, _error_3d, _cells_3d, 3),
+}
+
+# When a step asks for a finer mesh than it was computed on, and is computed again on that.
+
+_MOST = 4  # meshes that a run makes: behind that it goes on, and its bars say how well
+_FORGIVEN = 3.0  # times the share of K: bars along the way were foretold, not measured
+
+_SETTLED = 4  # steps: before, bars are wide behind a kink whose face is short, on any mesh
+_SIZE = 0.5  # of a crack: of less growth than that a path may err by a share of as much
+_WHOLE = 1.0  # of the tolerance, by all sources: below that no finer mesh is worth it
+# Times the share of K at the first step: bars of a crack that grows become shorter, and directions
+# err for the first step only.
+_BEGIN, _BEGIN_OF_PATH = 1.5, 3.0
+_SHORT_OF_PATH = 0.5  # of the tolerance: by K alone
+_LAST = 0.1  # of the cycles so far: what the rest may take at the present rate
+_SHORT = 1.3  # times a first step: the shortest that cells at kinks may allow
+
+
+def replanned(
+    begun: GrowthRule, rule: GrowthRule, last: Step | None, step: Step
+) -> tuple[GrowthRule, Step | None] | None:
+    """The run and the step from which one is to be computed again; None where that is good.
+
+    It follows from what is stored with the step before: a run that is resumed does the same.
+
+    Parameters
+    ----------
+    begun, rule : GrowthRule
+        On the mesh that it begins with, and on that of the step.
+    last : Step or None
+        The one before, which is handed over.
+    step : Step
+    """
+    other = _finer_at_kinks(begun, rule, step) if last is None else None
+    if other is not None:
+        return other, None
+    shorter = None if last is None else _step_before(last, step)
+    if shorter is not None:  # what the mesh leaves to be wished is seen on a step that stays
+        return rule, shorter
+    if not _is_mesh_too_coarse(rule, last, step):
+        return None
+    cells = _cells_for_room(rule, last) if _has_no_bar(step) else None
+    if cells is not None:
+        other = _with_cells(begun, cells, rule.meshes + 1)
+    elif _ends_soon(rule, step):
+        return None
+    else:
+        other = finer(begun, rule, step)
+    return other, last if last is None else _with_room(rule, other, last, step)
+
+
+def _step_before(last: Step, step: Step) -> Step | None:
+    """The step before one whose error is too large, with a shorter way ahead; None if that is not.
+
+    It follows from what is stored with both: a run that is taken up again does the same.
+    """
+    error, control = step.control.error, last.control
+    if error is None or error <= REJECTED or not control.can_shorten:
+        return None
+    length = next_length(control.length, error, None, control.least)
+    return replace(last, control=replace(control, length=length))
+
+
+def _ends_soon(rule: GrowthRule, step: Step) -> bool:
+    """Whether so little of the life is left to the last tip that no finer mesh is worth its time.
+
+    Not where cells are too coarse for steps of `da`: the run would end there.
+    """
+    if rule.problem.mesh.dim == 3 or step.n_tips != 1 or not step.cycles > 0:
+        return False
+    if rule.da is not None and rule.da < step.control.least:
+        return False
+    stations, solves = solves_of(step)
+    hit = exit_ahead(stations.x[0], solves.direction[-1, 0], rule.problem.mesh)
+    if hit is None:
+        return False
+    room = float(np.linalg.norm(hit[0] - stations.x[0]))
+    return room <= _LAST * step.cycles * float(solves.rate[-1, 0])
+
+
+def _has_no_bar(step: Step) -> bool:
+    return step.error is not None and bool(np.isnan(step.error.rate))
+
+
+def _finer_at_kinks(begun: GrowthRule, rule: GrowthRule, first: Step) -> GrowthRule | None:
+    """Finer cells at tips that kink at once, for a first step that a tolerance asks for.
+
+    None where that step has room.
+    """
+    if rule.meshes or rule.problem.mesh.dim == 3 or not rule.estimates or not first.n_tips:
+        return None
+    stations, solves = solves_of(first)
+    wanted = STEPS * float(rule.tolerance or 0.0)
+    length = first_length(LONGER_FIRST * float(solves.scale.min()), wanted, 0.0)
+    if not first.control.least > _SHORT * length:
+        return None
+    sizes = np.array([cell_for(length, angle) for angle in np.concatenate(first.angle).tolist()])
+    stay = np.zeros(len(sizes), dtype=bool)
+    return _with_cells(begun, CellSizes(stations.x, sizes, stay), rule.meshes + 1)
+
+
+def _cells_for_room(rule: GrowthRule, last: Step | None) -> CellSizes | None:
+    """Smaller cells where tips of the next step have too little room; None where they have it."""
+    if last is None or rule.problem.mesh.dim == 3:
+        return None
+    try:
+        place, size = tip_sizes(replace(rule.problem, cracks=plan_of(last).cracks))
+    except GeometryError:
+        return None
+    if (cell_sizes(rule.problem.mesh, place) <= size).all():
+        return None
+    cells = rule.cells
+    if cells is None:
+        return CellSizes(place, size, np.ones(len(size), dtype=bool))
+    return cells.with_ends(place, np.minimum(size, cells.size_at(place)))
+
+
+def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool:
+    """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
+    error = step.error
+    if not rule.estimates or error is None or not step.n_tips or rule.meshes >= _MOST:
+        return False
+    before = 0 if last is None else run_state(last).meshes
+    if rule.meshes > before or (rule.meshes and step.index < _SETTLED):
+        return False  # it was made for this step, or for a kink just behind it
+    tolerance = float(rule.tolerance or 0.0)
+    forgiven = 1.0 if rule.meshes == 0 else _FORGIVEN
+    rate, turn = _errors_of_step(rule, step)
+    if rule.meshes and _has_no_bar(step) and _cells_for_room(rule, last) is None:
+        return False
+    if rule.meshes and last is not None and not _has_no_bar(step):
+        rate, turn = map(min, (rate, turn), _errors_of_step(rule, last))
+    of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
+    if last is None:
+        return rate > _BEGIN * of_life or turn > _BEGIN_OF_PATH * of_path
+    cycles, way = step.cycles, max(error.grown, _SIZE * min(step.sizes, default=0.0))
+    if not (cycles > 0 and way > 0):
+        return False
+    # What the next solve tells better is no reason yet.
+    life, path = error.life - error.newest_cycles, error.path_but_newest
+    short_of_life = (error.K + error.contact + error.unknown) / cycles > of_life
+    short_of_path = error.K_place / way > _SHORT_OF_PATH * tolerance
+    return bool(
+        (rate > forgiven * of_life and short_of_life and life / cycles > _WHOLE * tolerance)
+        or (turn > forgiven * of_path and short_of_path and path / way > _WHOLE * tolerance)
+        or (rule.meshes == 0 and _has_no_room(last, step))
+    )
+
+
+_FIRST, _MEASURED = 3, 4  # solves with bars of their own: the first ones, and each of so many
+_MARGIN = 0.5  # of what K may take of a tolerance: bars that are foretold may be wrong
+_STRAIGHT = 0.2  # rad, most that a path turns by on the way to a solve with foretold bars
+
+
+def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
+    """Whether the bars of K at the next solve may follow from those of the last one.
+
+    In 2D under a cycle, between solves that have their own: where these leave a margin, the mesh
+    stays, and the path is smooth. It follows from what is stored with the step: a run that is
+    resumed does the same.
+    """
+    error, index = last.error, last.index + 1
+    if not rule.estimates or error is None or rule.problem.mesh.dim == 3:
+        return False
+    if index < _FIRST or index % _MEASURED == 0 or run_state(last).meshes != rule.meshes:
+        return False
+    if not isinstance(rule.cycle, Cycle) or rule.load_program is not None or last.joins:
+        return False
+    plan = plan_of(last)
+    if plan.joins or any(crack.ends_on for crack in plan.cracks):
+        return False
+    largest = max((float(np.abs(angle).max(initial=0.0)) for angle in last.angle), default=0.0)
+    if largest > _STRAIGHT or not np.isfinite(error.rate):
+        return False
+    wanted = _MARGIN * float(rule.tolerance or 0.0)
+    rate, turn = _errors_of_step(rule, last)
+    return rate <= SHARE * wanted and turn <= (1 - PATH) * wanted
+
+
+def _errors_of_step(rule: GrowthRule, step: Step) -> tuple[float, float]:
+    """Errors of rate and direction at a step by K, as they count for life and path."""
+    error = step.error
+    if error is None or np.isnan(error.rate):  # a finer mesh may have one
+        return 1.0, 1.0
+    return TOGETHER * error.rate, error.turn
+
+
+def _has_no_room(last: Step, step: Step) -> bool:
+    """Whether a step is too long, and the cells leave no room for a shorter one."""
+    error = step.control.error
+    return error is not None and error > REJECTED and not last.control.can_shorten
+
+
+def _with_room(rule: GrowthRule, other: GrowthRule, last: Step, step: Step) -> Step:
+    """The step before, with the way ahead that a finer mesh allows."""
+    places = np.concatenate([sif.x for sif in step.sif[0]])
+    sizes = [cell_sizes(each.problem.mesh, places) for each in (rule, other)]
+    control, error = last.control, step.control.error
+    least = control.least * min(float(np.median(sizes[1] / sizes[0])), 1.0)
+    length = control.length
+    if error is not None and error > REJECTED:
+        length = next_length(length, error, None, least)
+    return replace(last, control=replace(control, length=length, least=least))
+
+
+__all__ = [
+    "SHARE",
+    "at_step",
+    "bars_are_foretold",
+    "begin",
+    "bisected",
+    "finer",
+    "follow",
+    "replanned",
+]
