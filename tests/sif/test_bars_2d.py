@@ -42,7 +42,7 @@ def test_griffith(n):
     wanted = np.sqrt(np.pi * a) * np.array([[1.0, -shear], [1.0, shear]])
     assert np.linalg.norm(wanted - sif.best) < 0.6 * np.linalg.norm(wanted - sif.K)
     assert holds(sif, wanted)
-    assert sif.bar.max() < 2.5 * np.abs(wanted - sif.K).max()
+    assert sif.bar.max() < 5 * np.abs(wanted - sif.K).max()
 
 
 @pytest.mark.parametrize("n", [18, 24])

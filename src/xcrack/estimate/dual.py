@@ -133,7 +133,7 @@ class GoalGroups:
     position : (g,) array, length
         Of each along its crack.
     piece : (g,) array of int
-        Of the crack, between kinks.
+        Of the crack, between kinks and the ends of other cracks on it.
     """
 
     N: sp.csr_matrix
@@ -155,7 +155,7 @@ def groups_of(factored: FactoredSolution) -> GoalGroups | None:
             position = (m.values.T @ (lips.weight * lips.s)) / m.measure
             number = np.full(len(m.measure), m.crack)
             rows = gap_rows(m, lips, model.jumps[m.crack])
-            piece = np.searchsorted(_kinks(model.space, m.crack, lips), position)
+            piece = np.searchsorted(_breaks(model.space, m.crack, lips), position)
             parts.append((rows, active, pressure, number, position, piece))
     if not parts or contact.dual is None:
         return None
@@ -171,13 +171,15 @@ def groups_of(factored: FactoredSolution) -> GoalGroups | None:
     )
 
 
-def _kinks(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
-    """Positions of the kinks of a cut, as those of the points on its faces."""
-    line, kinks = space.cracks[c].points, space.cuts[c].kinks.points
-    if not len(kinks):
+def _breaks(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
+    """Positions of the kinks of a cut and of the cracks that end on it, as those of its points."""
+    line = space.cracks[c].points
+    ends = [joint.x for joint in space.joints if joint.on == c]
+    x = np.array([*space.cuts[c].kinks.points, *ends]).reshape(-1, 2)
+    if not len(x):
         return np.zeros(0)
     begin = arc_position(line, lips.x[:1])[0] - lips.s[0]
-    return np.asarray(np.sort(arc_position(line, kinks) - begin))
+    return np.asarray(np.sort(arc_position(line, x) - begin))
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,10 +253,11 @@ def _on_groups(factored: FactoredSolution, groups: GoalGroups, goals: Sequence[G
 
 
 def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -> Floats:
-    """|dJ with a group more closed + dJ with one less|, summed over the ends of contact `(m,)`.
+    """What a group more and one less do at the ends of contact: 1 / (1/|dJ+| + 1/|dJ-|) `(m,)`.
 
-    The first-order terms of the two are opposite where the end is right: what is left is of second
-    order, as the error is. Contact that ends at a kink ends where it should.
+    The end is between the two. Where one of the changes is small the end is near, however far off
+    the other would be: one group more at a wide gap, say. Contact that ends at a kink, or where
+    another crack ends on this one, ends where it should.
 
     Parameters
     ----------
@@ -275,13 +278,14 @@ def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -
     same_piece = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
     ends = np.nonzero((along[1:] != along[:-1]) & same_piece)[0]
     for end in ends:
-        change = np.zeros(len(total))
+        changes = []
         for group in (order[end], order[end + 1]):
             other = active.copy()
             other[group] = ~other[group]
             moved = of_set(groups.dual, opened, other)[0] - pressure
-            change += duals.per_pressure.T @ moved
-        total += np.abs(change)
+            changes.append(np.abs(duals.per_pressure.T @ moved))
+        both = changes[0] + changes[1]
+        total += changes[0] * changes[1] / np.where(both > 0, both, 1.0)
     return total
 
 

@@ -40,8 +40,7 @@ class Estimate:
     parts : (states, n, m) array
         Contributions of the surplus functions to eta.
     end : (states, m) array
-        Change of the functionals where the contact is a group longer and shorter; see
-        `end_changes`.
+        What a group more and one less at the ends of contact change; see `end_changes`.
     z : (states, n_dof, m) array
         Dual solutions.
     mu : tuple of (states, q, m) arrays

@@ -19,11 +19,11 @@ from xcrack.mesh.mesh import Mesh
 _ROUND = 0.9  # rad; facets that turn by more meet at a corner
 _ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
 # Share of each absolute contribution of a crack's shape that is in doubt: where it is smooth, of
-# each point of open faces, and of what a stretch of some cells contributes where they press, over
-# which the tilt is there and back; and besides at kinks, of each point, all of it from a turn of so
-# many rad on (measured: half of what a kink of 1 rad changes is of first order).
+# each point of open faces, and a larger one of what a stretch of some cells contributes where they
+# press, over which the tilt is there and back; and besides at kinks, of each point, all of it from
+# a turn of so many rad on (measured: half of what a kink of 1 rad changes is of first order).
 _STRETCH = 4.0
-_SMOOTH, _KINK, _BLUNT = 0.3, 0.8, 0.5
+_OPEN, _SMOOTH, _KINK, _BLUNT = 0.1, 0.2, 0.9, 0.5
 
 
 def crack_shape(
@@ -88,7 +88,8 @@ def crack_shape(
     stretch[order] = np.cumsum(cells[order]) / _STRETCH
     of_stretch = np.zeros((int(stretch.max()) + 1, *nothing.shape))
     np.add.at(of_stretch, stretch[moved][presses], smooth[presses])
-    doubt = _SMOOTH * (np.abs(of_stretch).sum(axis=0) + np.abs(smooth[~presses]).sum(axis=0))
+    doubt = _SMOOTH * np.abs(of_stretch).sum(axis=0)
+    doubt += _OPEN * np.abs(smooth[~presses]).sum(axis=0)
     doubt += (_SMOOTH + _KINK) * np.einsum("q,qkm->km", blunt, np.abs(parts))
     return parts.sum(axis=0), doubt
 

@@ -2,8 +2,9 @@
 
 Cells that are too large for an estimate (a crack, or the room to a boundary, another tip, a kink or
 another material, of less than a few of them) become small enough for it: K of the second solution
-with its own bar is then what is known. Where nothing is estimated, as with friction, cells along
-all faces become smaller, and the change of K is the bar.
+with its own bar is then what is known. Where nothing is estimated, cells along all faces become
+smaller, and the change of K is the bar; with friction a small part of it, for most of a large
+change is what the second solution mends, and what its cells and domains leave.
 """
 
 import warnings
@@ -18,14 +19,17 @@ from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import XcrackError, XcrackWarning
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.refinement import growing_sizes, refine
-from xcrack.sif.domain_2d import intensity_at_tip
+from xcrack.sif.domain_2d import domain_of, intensity_at_tip
 from xcrack.sif.sif import SIF, KErrors, bars_of, joined_sif
 
 _GROWS = 0.3  # by which cells grow with the distance from where they are smallest
 _HALF = 0.5  # of a cell, where nothing is estimated
 # Of the change of both modes of K to the second solution: what is added, as squares are, where that
 # has a bar of its own; of the largest change of a crack, least half-width where it has none.
-_ADDED, _LEAST = 0.01, 0.75
+_ADDED, _LEAST = 0.002, 0.75
+# With friction the root of the sum of squares of parts of the largest change of a crack, the spread
+# of both modes in the second solution, and its largest K times (cell / length of the crack)^1.5.
+_RUBBED_CHANGE, _RUBBED_SPREAD, _RUBBED_CELLS = 0.03, 1.8, 0.03
 # Reasons that smaller cells do not take away, and that the change of K does not show.
 _STAYS = (
     "order 1", "contact by", "the faces press at the kink",
@@ -114,19 +118,45 @@ def bars_by_finer_cells(
         return None
     second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer))]
     of_second = estimate(finer, second, crack)
+    cells = None
+    if any(c is not None and c.shear is not None for c in finer[0].contact):
+        length = float(finer[0].lips[crack].weight.sum())
+        cells = np.array([domain_of(finer[0], t).size for t in tips]) / length
     every = zip(sifs, second, of_second, strict=True)
-    return [_from_second(*one) for one in every]
+    return [_from_second(*one, cells) for one in every]
 
 
-def _from_second(sif: SIF, second: SIF, of_second: KErrors) -> KErrors:
-    """Bars of one state from the second solution."""
+def _half_widths_of_change(change: Floats) -> Floats:
+    """The change of K to the second solution, at least a share of the largest of the crack."""
+    both = np.linalg.norm(change, axis=1, keepdims=True)
+    return np.asarray(np.maximum(np.abs(change), _LEAST * both.max(initial=0.0)))
+
+
+def _half_widths_of_friction(second: SIF, change: Floats, cells: Floats) -> Floats:
+    """What the change, the spread and the cells of the second solution leave; cells per length."""
+    largest = np.abs(second.K).max(initial=0.0)
+    parts = [
+        np.full(len(cells), _RUBBED_CHANGE * np.abs(change).max(initial=0.0)),
+        _RUBBED_SPREAD * np.linalg.norm(second.spread, axis=1),
+        _RUBBED_CELLS * largest * cells**1.5,
+    ]
+    half = np.sqrt(np.sum(np.square(parts), axis=0))
+    return np.asarray(np.repeat(half[:, None], change.shape[1], axis=1))
+
+
+def _from_second(sif: SIF, second: SIF, of_second: KErrors, cells: Floats | None) -> KErrors:
+    """Bars of one state from the second solution; with friction by its cells per length."""
     left = [reason if reason.startswith(_STAYS) else "" for reason in of_second.reasons]
     is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
     best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
     eta = best - sif.K
     eta[sif.closed, 0] = 0.0  # K_I of closed tips is zero
     both = np.linalg.norm(eta, axis=1, keepdims=True)
-    half = np.maximum(np.abs(eta), _LEAST * both.max(initial=0.0))
+    half = (
+        _half_widths_of_change(eta)
+        if cells is None
+        else _half_widths_of_friction(second, eta, cells)
+    )
     known = np.hypot(of_second.bar, _ADDED * both)
     bar = np.where(is_known[:, None], known, half)
     shut = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
