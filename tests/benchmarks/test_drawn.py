@@ -27,7 +27,7 @@ def test_a_few_scenes_and_their_page(tmp_path):
     again = stored(tmp_path, range(1, 5), range(0))  # nothing is run twice
     assert again == rows
     text = drawn.page(rows)
-    assert "The first 4 of 8 500 scenes in the plane and 0 of 1 500 in space" in text
+    assert "4 of 8 500 scenes in the plane (seeds 1 to 4) and 0 of 1 500 in space" in text
     assert "| plane | 4 of 8500 | 4 | 0 | 0 | 0 | 0 |" in text
 
 
