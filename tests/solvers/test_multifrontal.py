@@ -135,6 +135,23 @@ def test_a_matrix_that_is_not_positive_is_refused():
     assert factorise(sp.csc_matrix(holes @ A @ holes), columns, halves) is None
 
 
+def test_one_pivot_that_is_not_positive_is_found_in_every_front():
+    """In those that loops factor and in those of LAPACK, in their first columns and their last."""
+    problem = plane([EDGE])
+    A, columns = matrix_of(problem)
+    halves = tree(problem.mesh, 2)
+    factor = factorise(A, columns, halves)
+    first = factor.first_unknown
+    widths = np.diff(first)
+    assert widths.min() <= 8
+    assert widths.max() > 32
+    for part in (*range(0, len(widths), 9), len(widths) - 1):
+        for place in {first[part], first[part + 1] - 1} if widths[part] else ():
+            unknown = factor.perm[place]
+            dent = sp.csc_matrix(([A[unknown, unknown]], ([unknown], [unknown])), A.shape)
+            assert factorise(sp.csc_matrix(A - dent), columns, halves) is None
+
+
 def test_nan_is_not_taken_for_a_solution(monkeypatch):
     sound = multifrontal.factorise
 

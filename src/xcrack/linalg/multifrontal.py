@@ -208,7 +208,8 @@ def factorise(
     from xcrack.linalg.kernels.multifrontal import (
         arrange_parts,
         column_parts,
-        places_of_updates,
+        heights,
+        places_of_squares,
         sizes,
         unchanged_parts,
     )
@@ -224,18 +225,25 @@ def factorise(
     )
     fronts = first, begin, in_parent, start, row, value, order, rank
     panel_size, update_size, _ = sizes(first, begin)
-    depth = len(order).bit_length() - 1
-    # Subtrees of that many levels have a stack each; above them update matrices are stored.
-    lowest = min(_UNIT, depth) if keep else max(depth - _SHARED, min(_UNIT, depth))
-    place, height, stack = places_of_updates(order, rank, update_size, lowest)
-    while lowest <= depth and update_size[place < 0].sum() > _MOST:
+    height = heights(order, rank)
+    depth = int(height[-1])
+    # Update matrices of parts with that many levels below are kept for the next factorisation.
+    lowest = min(_UNIT, depth)
+    while lowest <= depth and update_size[height >= lowest].sum() > _MOST:
         lowest += 1
-        place, height, stack = places_of_updates(order, rank, update_size, lowest)
-    own_size = np.where(place < 0, update_size, 0)
+    level = min(max(depth - _SHARED, lowest), depth)
+    is_kept = (height >= lowest) | (height == level) if keep else height == level
+    place, *stacks = places_of_squares(order, rank, begin, height, is_kept, level)
+    own_size = np.where(is_kept, update_size, 0)
     used = int(panel_size.sum() + (own_size.sum() if keep else 0))
     chosen_parts = np.ones(len(order), dtype=bool)
     earlier: tuple[Floats, ...] = ()
-    if before is not None and before.tree is tree and before.subtree_levels == lowest <= depth:
+    if (
+        keep
+        and before is not None
+        and before.tree is tree
+        and before.subtree_levels == lowest <= depth
+    ):
         chosen_parts = _parts_to_factor(
             ~unchanged_parts(fronts, before.fronts), order, rank, height, lowest
         )
@@ -245,7 +253,9 @@ def factorise(
     if earlier and before is not None:
         panel = np.where(chosen_parts, panel, before.panel)
         update = np.where(chosen_parts, update, before.update)
-    if _factor_subtrees(fronts, panel, update, (place, height, chosen_parts), stack, lowest):
+    if _factor_subtrees(
+        fronts, panel, update, (place, is_kept, height, chosen_parts), stacks, level
+    ):
         return None
     memory = (*earlier, lock(panels), lock(updates)) if keep else (lock(panels),)
     if sum(len(part) for part in memory) > _SPREAD * used:
@@ -262,28 +272,35 @@ def _factor_subtrees(
     fronts: tuple[Any, ...],
     panel: Ints,
     update: Ints,
-    parts: tuple[Ints, Ints, Bools],
-    stack: int,
-    lowest: int,
+    parts: tuple[Ints, Bools, Ints, Bools],
+    stacks: list[int],
+    level: int,
 ) -> bool:
     """Factor subtrees side by side, then what is above them; whether a pivot was not positive.
 
-    `parts` are the places of update matrices in a stack, heights, and which parts to factor.
+    `parts` are the places of update matrices in stacks, whether they are kept, heights, and which
+    parts to factor.
     """
     from xcrack.linalg.kernels.multifrontal import factor_parts
 
-    place, height, chosen_parts = parts
-    depth = int(height[-1])
-    level = min(max(depth - _SHARED, lowest), depth)
+    place, is_kept, height, chosen_parts = parts
+    square = np.zeros(len(place), dtype=np.uint64)
+    spare: list[Floats] = []
+
+    def factor(chosen: Bools, begin: int, end: int, room: Floats) -> int:
+        square[begin:end] = np.where(
+            chosen[begin:end], room.ctypes.data + 8 * place[begin:end], square[begin:end]
+        )
+        return int(factor_parts(fronts, panel, update, square, is_kept, chosen, begin, end))
 
     def subtree(root: int) -> int:
         begin, end = root + 2 - (2 << level), root + 1
         if not chosen_parts[begin:end].any():
             return 0
-        scratch = np.empty(stack)
-        at = np.uint64(scratch.ctypes.data) + np.uint64(8) * place[begin:end].astype(np.uint64)
-        update[begin:end] = np.where(place[begin:end] >= 0, at, update[begin:end])
-        return int(factor_parts(fronts, panel, update, chosen_parts, begin, end))
+        room = spare.pop() if spare else np.empty(stacks[0])
+        failed = factor(chosen_parts, begin, end, room)
+        spare.append(room)
+        return failed
 
     with one_blas_thread():
         roots = np.nonzero(height == level)[0].tolist()
@@ -291,12 +308,12 @@ def _factor_subtrees(
         if any(map(subtree, roots) if few else map_tasks(subtree, roots)):
             return True
         above = chosen_parts & (height > level)
-        return bool(above.any() and factor_parts(fronts, panel, update, above, 0, len(height)))
+        return bool(above.any() and factor(above, 0, len(height), np.empty(stacks[1])))
 
 
 def _room(size: Ints) -> tuple[Floats, Any]:
-    """An array for numbers of parts, and the address of those of each."""
-    numbers = np.empty(int(size.sum()))
+    """An array of zeros for numbers of parts, and the address of those of each."""
+    numbers = np.zeros(int(size.sum()))
     begin = np.concatenate([[0], np.cumsum(size)[:-1]]).astype(np.uint64)
     return numbers, np.uint64(numbers.ctypes.data) + np.uint64(8) * begin
 

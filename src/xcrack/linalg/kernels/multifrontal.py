@@ -1,10 +1,11 @@
 """A multifrontal Cholesky factorisation: tree, rows and places of its parts, then numbers.
 
 A part assembles its entries and the update matrices of its two children into a dense front, factors
-its own columns, and hands the rest to its parent (Duff and Reid, 1983). Panels hold pivots and the
-rows below them, column by column; update matrices the lower triangle, packed. Numbers are those of
-scipy's BLAS and LAPACK, called by address, with one thread: sums in another order would have other
-last bits.
+its own columns, and hands the rest to its parent (Duff and Reid, 1983). Fronts are not copied:
+columns are made where they stay, as a panel of pivots and the rows below them, and the rest in a
+square of a stack; update matrices that are kept are packed, as lower triangles. Large fronts are
+left to scipy's BLAS and LAPACK, called by address, with one thread: sums in another order would
+have other last bits.
 """
 
 import numba
@@ -13,40 +14,103 @@ import numpy as np
 from xcrack.base.kernels.blas import dgemm, dgemv, doubles_at, dpotrf, dsyrk, dtrsm, dtrsv
 from xcrack.base.kernels.jit import kernel
 
-_SMALL = 24  # rows of a front below which plain loops are quicker than calls of BLAS
+_SMALL = 64  # rows of a front below which loops update it quicker than BLAS
+_NARROW = 32  # and columns up to which they factor it quicker
 
 
 @kernel
-def _factored_by_loops(F, m, k):  # type: ignore[no-untyped-def]
-    """Factor the first k columns of a front `(m, m)` and update the others; columns that failed."""
+def _add_stretch(target, source, count):  # type: ignore[no-untyped-def]
+    """Add numbers at an address to those at another."""
+    x = numba.carray(doubles_at(target), (count,))
+    y = numba.carray(doubles_at(source), (count,))
+    for i in range(count):
+        x[i] += y[i]
+
+
+@kernel
+def _subtract_products(target, first, step, columns, count):  # type: ignore[no-untyped-def]
+    """Subtract from a column the sum of others times their first numbers, four at a time.
+
+    Column j begins at `first` + j `step`.
+    """
+    x = numba.carray(doubles_at(target), (count,))
+    for _ in range(columns // 4):
+        a = numba.carray(doubles_at(first), (count,))
+        b = numba.carray(doubles_at(first + step), (count,))
+        c = numba.carray(doubles_at(first + 2 * step), (count,))
+        d = numba.carray(doubles_at(first + 3 * step), (count,))
+        f, g, h, o = a[0], b[0], c[0], d[0]
+        for i in range(count):
+            x[i] -= (f * a[i] + g * b[i]) + (h * c[i] + o * d[i])
+        first += 4 * step
+    for _ in range(columns % 4):
+        a = numba.carray(doubles_at(first), (count,))
+        f = a[0]
+        for i in range(count):
+            x[i] -= f * a[i]
+        first += step
+
+
+@kernel
+def _factored_panel(panel, m, k):  # type: ignore[no-untyped-def]
+    """Factor a panel `(m, k)` by columns; 1 where a pivot is not positive."""
+    step = np.uint64(8 * m)
     for j in range(k):
-        pivot = F[j * m + j]
-        if not pivot > 0.0:
+        # Column j less what the columns before it have in its row.
+        at = panel + np.uint64(8 * (j * m + j))
+        _subtract_products(at, panel + np.uint64(8 * j), step, j, m - j)
+        x = numba.carray(doubles_at(at), (m - j,))
+        if not x[0] > 0.0:
             return 1
-        d = np.sqrt(pivot)
-        F[j * m + j] = d
-        for i in range(j + 1, m):
-            F[j * m + i] /= d
-        for c in range(j + 1, m):
-            f = F[j * m + c]
-            if f != 0.0:
-                for i in range(c, m):
-                    F[c * m + i] -= f * F[j * m + i]
+        x[0] = np.sqrt(x[0])
+        for i in range(1, m - j):
+            x[i] /= x[0]
     return 0
 
 
 @kernel
-def factor_parts(fronts, panel, update, chosen_parts, low_part, high_part):  # type: ignore[no-untyped-def]
+def _add_update(panel, update, source, is_packed, places, m, k, run):  # type: ignore[no-untyped-def]
+    """Add the update matrix of a child to the columns of its parent's front.
+
+    `places` of its rows in that front ascend; stretches of them without a gap are added at once.
+    """
+    b, runs = len(places), 0
+    for j in range(b):
+        if j == 0 or places[j] != places[j - 1] + 1:
+            run[runs] = j
+            runs += 1
+    run[runs] = b
+    before = 0
+    for j in range(b):
+        if j == run[before + 1]:
+            before += 1
+        c = places[j]
+        column = panel + np.uint64(8 * c * m)
+        if c >= k:
+            column = update + np.uint64(8 * (c - k) * (m - k)) - np.uint64(8 * k)
+        i = j
+        for r in range(before, runs):
+            _add_stretch(
+                column + np.uint64(8 * places[i]), source + np.uint64(8 * i), run[r + 1] - i
+            )
+            i = run[r + 1]
+        source += np.uint64(8 * (b - j - 1 if is_packed else b))
+
+
+@kernel
+def factor_parts(fronts, panel, update, square, is_kept, chosen_parts, low_part, high_part):  # type: ignore[no-untyped-def]
     """Factor parts of a tree, and hand their updates upwards.
 
     Parameters
     ----------
     fronts : tuple of arrays
-        first, begin, in_parent, start, row, value, order, rank of `fronts.arranged`.
-    panel, update : (parts,) arrays of uint64
-        Addresses of the panel and of the update matrix of each part; they are written to.
-    chosen_parts : (parts,) array of bool
-        Parts to factor; the panels and update matrices of others are there.
+        first, begin, in_parent, start, row, value, order, rank of `arrange_parts`.
+    panel, update, square : (parts,) arrays of uint64
+        Addresses of the panel, of the packed update matrix of a part that is kept, and of the room
+        of `(b, b)` that it is made in. They are written to; panels must be zero.
+    is_kept, chosen_parts : (parts,) arrays of bool
+        Parts whose update matrices are packed, and parts to factor; the panels and update matrices
+        of others are there.
     low_part, high_part : int
         Range of parts in postorder.
 
@@ -57,10 +121,10 @@ def factor_parts(fronts, panel, update, chosen_parts, low_part, high_part):  # t
     """
     first, begin, in_parent, start, row, value, order, rank = fronts
     parts = len(order)
-    largest = 0
-    for t in range(low_part, high_part):
-        largest = max(largest, first[t + 1] - first[t] + begin[t + 1] - begin[t])
-    F = np.empty(largest * largest)
+    longest = 0
+    for t in range(parts):
+        longest = max(longest, begin[t + 1] - begin[t])
+    run = np.empty(longest + 1, np.int64)
     size, scalar, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
     scalar[0], scalar[1] = 1.0, -1.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R
@@ -79,53 +143,47 @@ def factor_parts(fronts, panel, update, chosen_parts, low_part, high_part):  # t
         low = first[t]
         k, b = first[t + 1] - low, begin[t + 1] - begin[t]
         m = k + b
-        for j in range(m):
-            for i in range(j, m):
-                F[j * m + i] = 0.0
+        L = numba.carray(doubles_at(panel[t]), (k * m,))
         for j in range(k):
             for e in range(start[low + j], start[low + j + 1]):
-                F[j * m + row[e]] = value[e]
+                L[j * m + row[e]] = value[e]
+        for j in range(b):
+            below = numba.carray(doubles_at(square[t] + np.uint64(8 * j * (b + 1))), (b - j,))
+            for i in range(b - j):
+                below[i] = 0.0
         p = order[t]
         if 2 * p <= parts:
             for child in (rank[2 * p], rank[2 * p + 1]):
-                at, end, source = begin[child], begin[child + 1], 0
-                below = end - at
-                W = numba.carray(doubles_at(update[child]), (below * (below + 1) // 2,))
-                for j in range(at, end):
-                    column = in_parent[j] * m
-                    for i in range(j, end):
-                        F[column + in_parent[i]] += W[source]
-                        source += 1
-        if k > 0:
-            if m <= _SMALL:
-                if _factored_by_loops(F, m, k) != 0:
-                    return 1
-            else:
-                size[0], size[1], size[2] = m, k, b
-                front = F.ctypes.data
-                dpotrf(lower, pivots, front, rows, info)
-                if size[3] != 0:
-                    return 1
-                if b > 0:
-                    panel21 = front + 8 * k
-                    dtrsm(
-                        right, lower, transposed, plain, rest, pivots, one, front, rows, panel21,
-                        rows,
-                    )  # fmt: skip
-                    dsyrk(
-                        lower, plain, rest, pivots, minus, panel21, rows, one,
-                        front + 8 * (k * m + k), rows,
-                    )  # fmt: skip
-            L = numba.carray(doubles_at(panel[t]), (k * m,))
-            for j in range(k):
-                for i in range(j, m):
-                    L[j * m + i] = F[j * m + i]
-        W = numba.carray(doubles_at(update[t]), (b * (b + 1) // 2,))
-        to = 0
-        for j in range(k, m):
-            for i in range(j, m):
-                W[to] = F[j * m + i]
-                to += 1
+                source = update[child] if is_kept[child] else square[child]
+                places = in_parent[begin[child] : begin[child + 1]]
+                _add_update(panel[t], square[t], source, is_kept[child], places, m, k, run)
+        size[0], size[1], size[2] = m, k, b
+        beyond = panel[t] + np.uint64(8 * k)
+        if k <= _NARROW:
+            if _factored_panel(panel[t], m, k) != 0:
+                return 1
+        else:
+            dpotrf(lower, pivots, panel[t], rows, info)
+            if size[3] != 0:
+                return 1
+            if b > 0:
+                dtrsm(
+                    right, lower, transposed, plain, rest, pivots, one, panel[t], rows, beyond, rows
+                )
+        if m <= _SMALL:
+            for c in range(b):
+                target = square[t] + np.uint64(8 * c * (b + 1))
+                _subtract_products(target, beyond + np.uint64(8 * c), np.uint64(8 * m), k, b - c)
+        elif k > 0 and b > 0:
+            dsyrk(lower, plain, rest, pivots, minus, beyond, rows, one, square[t], rest)
+        if is_kept[t]:
+            packed = numba.carray(doubles_at(update[t]), (b * (b + 1) // 2,))
+            to = 0
+            for j in range(b):
+                below = numba.carray(doubles_at(square[t] + np.uint64(8 * j * (b + 1))), (b - j,))
+                for i in range(b - j):
+                    packed[to + i] = below[i]
+                to += b - j
     # Addresses alone keep no array alive: numba frees it after its last use.
     return 0 if letter[0] == 76 and scalar[0] == 1.0 else 2
 
@@ -589,38 +647,46 @@ def sizes(first, begin):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def places_of_updates(order, rank, update, lowest):  # type: ignore[no-untyped-def]
-    """Where the update matrix of each part is stored.
+def heights(order, rank):  # type: ignore[no-untyped-def]
+    """Levels below each part `(parts,)`."""
+    height = np.zeros(len(order), dtype=np.int64)
+    for t in range(len(order)):
+        if 2 * order[t] <= len(order):
+            height[t] = height[rank[2 * order[t]]] + 1
+    return height
 
-    Parts with fewer than `lowest` levels below them share a stack, which is empty again once a part
-    with that many has taken what it needs; the others have places of their own.
+
+@kernel
+def places_of_squares(order, rank, begin, height, is_kept, level):  # type: ignore[no-untyped-def]
+    """Where the update matrix of each part is made: in stacks, which parts take in postorder.
+
+    Even and odd levels have a stack each, so that a part and its children never share one. Subtrees
+    with `level` levels have stacks of their own, and so has what is above them.
 
     Returns
     -------
     place : (parts,) array of int
-        In the stack; -1 for a place of its own.
-    height : (parts,) array of int
-        Levels below each part.
-    stack : int
-        Entries that the stack takes.
+    below, above : int
+        Entries that the stacks of a subtree take, and those above the subtrees.
     """
-    parts = len(order)
-    place, height = np.zeros(parts, dtype=np.int64), np.zeros(parts, dtype=np.int64)
-    top, stack = 0, 0
-    for t in range(parts):
-        p = order[t]
-        if 2 * p <= parts:
-            height[t] = height[rank[2 * p]] + 1
-        if height[t] >= lowest:
-            place[t] = -1
-            top = 0
-            continue
-        if 2 * p <= parts:
-            top = place[rank[2 * p]]
-        place[t] = top
-        top += update[t]
-        stack = max(stack, top)
-    return place, height, stack
+    place = np.zeros(len(order), dtype=np.int64)
+    top, most = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
+    for t in range(len(order)):
+        p, h = order[t], height[t]
+        stack = 2 * (h > level) + h % 2
+        place[t] = top[stack]
+        size = (begin[t + 1] - begin[t]) ** 2
+        most[stack] = max(most[stack], top[stack] + size)
+        if h > 0:
+            for child in (rank[2 * p], rank[2 * p + 1]):
+                if not is_kept[child]:
+                    top[2 * (h - 1 > level) + (h - 1) % 2] -= (begin[child + 1] - begin[child]) ** 2
+        if not is_kept[t]:
+            top[stack] += size
+    for t in range(len(order)):
+        if height[t] % 2 == 1:
+            place[t] += most[2 * (height[t] > level)]
+    return place, most[0] + most[1], most[2] + most[3]
 
 
 @kernel
