@@ -195,7 +195,7 @@ def test_children_come_before_parents(depth):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_halves_of_a_mesh(dim):
-    """Each part has half of its parent's cells, to one; a node sits where all its cells are."""
+    """As many levels as halving takes; a node sits where all its cells are."""
     mesh = xc.box((0,) * dim, (1,) * dim, {2: 21, 3: 5}[dim])
     halves = tree(mesh, 1)
     assert tree(mesh, 1).node_to_part.tobytes() == halves.node_to_part.tobytes()
@@ -210,6 +210,27 @@ def test_halves_of_a_mesh(dim):
             high, low = np.maximum(one, other), np.minimum(one, other)
             level = [np.floor(np.log2(x)).astype(int) for x in (high, low)]
             np.testing.assert_array_equal(high >> (level[0] - level[1]), low)
+
+
+@pytest.mark.parametrize("odd", [False, True])
+def test_cuts_lie_on_lines_of_the_mesh(odd):
+    """The first cut of a square of n rows is one line of n + 1 points, also where n is odd."""
+    n = 14 + odd
+    mesh = xc.box((0, 0), (1, 1), n)
+    assert (tree(mesh, 1).node_to_part == 1).sum() == n + 1
+
+
+def test_a_cut_keeps_away_from_fine_cells():
+    """Cells halved around a point: the cut at the median has a quarter more points (38 and 49)."""
+    mesh = xc.box((-1, -1), (1, 1), 24)
+    for reach in (0.6, 0.4, 0.25, 0.12):
+        distance = np.linalg.norm(mesh.points[mesh.cells].mean(axis=1) - [-0.1, 0.04], axis=1)
+        mesh = xc.refine(mesh, np.nonzero(distance < reach)[0])
+    middle = mesh.points[mesh.cells].mean(axis=1)
+    left = np.argsort(middle[:, 0], kind="stable")[: len(middle) // 2]
+    right = np.setdiff1d(np.arange(len(middle)), left)
+    on_both = np.intersect1d(mesh.cells[left], mesh.cells[right])
+    assert (tree(mesh, 1).node_to_part == 1).sum() < 0.85 * len(on_both)
 
 
 # --- what changed --------------------------------------------------------------------------------

@@ -1,7 +1,8 @@
 """Multifrontal Cholesky factorisation on the tree of the mesh, and only of what has changed.
 
-Cells are halved by the medians of their centroids until eight are left; an unknown belongs to the
-lowest part of that tree that holds its whole support (nested dissection, George 1973, by geometry).
+Cells are halved across a long side, where few points lie on the cut, until eight are left; an
+unknown belongs to the lowest part of that tree that holds its whole support (nested dissection,
+George 1973, by geometry).
 Unknowns couple where they share a cell, so every coupling lies on one path to the root, whatever
 basis the enriched unknowns are in, and the tree serves every crack in the mesh. A part whose own
 entries and whose children are the same bits as before has the same panel: it is taken over.
@@ -62,7 +63,7 @@ def tree(mesh: Mesh, order: int) -> Tree:
     centre = mesh.points[mesh.cells].mean(axis=1)
     depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
     ranked = np.stack([np.argsort(x, kind="stable") for x in centre.T])
-    leaf = bisect_cells(ranked, centre, depth)
+    leaf = bisect_cells(ranked, centre, mesh.cells, mesh.n_points, depth)
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     part = node_parts(nodes, leaf, depth, int(nodes.max()) + 1)
     parts, rank = postorder(depth)

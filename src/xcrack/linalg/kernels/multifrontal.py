@@ -15,6 +15,7 @@ from xcrack.base.kernels.blas import dgemm, dgemv, doubles_at, dpotrf, dsyrk, dt
 from xcrack.base.kernels.jit import kernel
 
 _SMALL = 64  # rows of a front below which loops update it quicker than BLAS
+_SLACK = 0.1  # share of the cells by which halves may differ from a half
 _NARROW = 32  # and columns up to which they factor it quicker
 
 
@@ -395,14 +396,53 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
 
 
 @kernel
-def bisect_cells(ranked, centre, depth):  # type: ignore[no-untyped-def]
-    """Leaf of each cell after halving at medians along the longer side.
+def _cut(ranked, centre, cells, low, high, last, seen, begins):  # type: ignore[no-untyped-def]
+    """Axis and place of a cut near the middle of some cells, with the fewest points on it.
+
+    `last` is the last cell of each point, `seen` the latest look at it and, at its end, how many
+    looks there were, `begins` the number of points that come with each cell.
+    """
+    half, widest = low + (high - low) // 2, 0.0
+    axis, place, least = 0, half, np.inf
+    for i in range(len(ranked)):
+        widest = max(widest, centre[ranked[i, high - 1], i] - centre[ranked[i, low], i])
+    slack = int(_SLACK * (high - low))
+    for i in range(len(ranked)):
+        if centre[ranked[i, high - 1], i] - centre[ranked[i, low], i] < 0.5 * widest:
+            continue
+        seen[-1] += 1
+        for k in range(low, high):
+            begins[k] = 0
+            for j in range(cells.shape[1]):
+                point = cells[ranked[i, k], j]
+                last[point] = k
+                if seen[point] != seen[-1]:
+                    seen[point] = seen[-1]
+                    begins[k] += 1
+        points = 0  # that have cells on both sides of the cut behind cell k
+        for k in range(low, half + slack):
+            points += begins[k]
+            for j in range(cells.shape[1]):
+                points -= last[cells[ranked[i, k], j]] == k
+            off = abs(k + 1 - half)
+            if off <= slack:
+                price = points * (1.0 + 4.0 * (off / (high - low)) ** 2)
+                if price < least or (price == least and off < abs(place - half)):
+                    axis, place, least = i, k + 1, price
+    return axis, place
+
+
+@kernel
+def bisect_cells(ranked, centre, cells, n_points, depth):  # type: ignore[no-untyped-def]
+    """Leaf of each cell after halving across a long side, where few points lie on the cut.
 
     Parameters
     ----------
     ranked : (d, n) array of int
         Cells in the order of each coordinate. It is changed.
     centre : (n, d) array
+    cells : (n, d + 1) array of int
+    n_points : int
     depth : int
         Levels of halving.
 
@@ -412,6 +452,8 @@ def bisect_cells(ranked, centre, depth):  # type: ignore[no-untyped-def]
         Number 0 to 2^depth - 1.
     """
     d, n = ranked.shape
+    last, seen = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
+    begins = np.empty(n, dtype=np.int64)
     leaf = np.empty(n, dtype=np.int64)
     low, high = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     high[0] = n
@@ -422,20 +464,13 @@ def bisect_cells(ranked, centre, depth):  # type: ignore[no-untyped-def]
         new_low, new_high = np.empty(2 * m, dtype=np.int64), np.empty(2 * m, dtype=np.int64)
         for g in range(m):
             a, b = low[g], high[g]
-            half = a + (b - a) // 2
-            new_low[2 * g], new_high[2 * g], new_low[2 * g + 1], new_high[2 * g + 1] = (
-                a,
-                half,
-                half,
-                b,
-            )
+            half, axis = a + (b - a) // 2, 0
+            if b - a > 1:
+                axis, half = _cut(ranked, centre, cells, a, b, last, seen, begins)
+            new_low[2 * g], new_high[2 * g] = a, half
+            new_low[2 * g + 1], new_high[2 * g + 1] = half, b
             if b - a < 2:
                 continue
-            axis, widest = 0, -1.0
-            for i in range(d):
-                width = centre[ranked[i, b - 1], i] - centre[ranked[i, a], i]
-                if width > widest:
-                    axis, widest = i, width
             for k in range(a, b):
                 lower[ranked[axis, k]] = k < half
             for i in range(d):
