@@ -61,10 +61,12 @@ def test_stiffness_of_any_material(d, graded):
     derivative = shape_derivatives(2, bary)
     data = np.zeros((len(indices), d, d))
     factor = rng.uniform(0.5, 2, (1, d + 1)) if graded else None
-    add_block_stiffness(
-        data, np.arange(1), slot, mesh.gradient, mesh.volume, derivative, bary, share, factor,
-        *stiffness,
-    )  # fmt: skip
+    middle = indptr[2]  # rows of blocks by two threads
+    for low, high in ((0, middle), (middle, len(indices))):
+        add_block_stiffness(
+            data, low, high, np.arange(1), slot, mesh.gradient, mesh.volume, derivative, bary,
+            share, factor, *stiffness,
+        )  # fmt: skip
     blocks = data[slot[0]].transpose(0, 2, 1, 3)
     gradient = np.einsum("qak,ki->qai", derivative, mesh.gradient[0])
     at_points = bary @ factor[0] if graded else 1.0

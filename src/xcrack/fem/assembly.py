@@ -1,14 +1,20 @@
 """Stiffness, of the uncracked body once a mesh, of enriched cells once a crack."""
 
 from dataclasses import dataclass
-from itertools import combinations
+from functools import partial
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, ranges, row_stretches
-from xcrack.base.machine import one_blas_thread, stream_tasks
+from xcrack.base.machine import (
+    map_tasks,
+    number_of_threads,
+    one_blas_thread,
+    stream_tasks,
+)
 from xcrack.fem.facets import LipPoints, part_points, split_facets
 from xcrack.fem.function_space import Batch, FunctionSpace
 from xcrack.fem.quadrature import (
@@ -508,13 +514,21 @@ def bulk(elasticity: Elasticity, order: int) -> Bulk:
     n_nodes = mesh.n_points + (len(mesh.edges) if order == 2 else 0)
     indptr, indices, slot = block_pattern(nodes, n_nodes)
     data = np.zeros((len(indices), mesh.dim, mesh.dim))
+    # Threads have rows of their own, so that each sum has the order of the cells.
+    rows = np.linspace(0, n_nodes, number_of_threads() + 1).astype(np.int64)
+    spans = list(pairwise(indptr[rows].tolist()))
+
+    def add_rows(given: tuple[Any, ...], span: tuple[int, int]) -> None:
+        add_block_stiffness(data, *span, *given)
+
     for material, cells in elasticity.groups(np.arange(len(mesh.cells))):
         factor = elasticity.factor if material.is_graded else None
         bary, weight = simplex_rule(mesh.dim, 2 * (order - 1) + material.is_graded)
-        add_block_stiffness(
-            data, cells, slot, mesh.gradient, mesh.volume, shape_derivatives(order, bary), bary,
-            weight, factor, *isotropic_part(material.unit.tensor(mesh.dim)),
+        given = (
+            cells, slot, mesh.gradient, mesh.volume, shape_derivatives(order, bary), bary, weight,
+            factor, *isotropic_part(material.unit.tensor(mesh.dim)),
         )  # fmt: skip
+        map_tasks(partial(add_rows, given), spans)
     if mesh.dim == 3:
         for part in row_stretches(len(data)):
             data[part] = data[part].transpose(0, 2, 1).copy()

@@ -62,7 +62,20 @@ def product(A: sp.csr_matrix, B: sp.csr_matrix) -> sp.csr_matrix:
             @ B
         )
 
-    return sp.csr_matrix(sp.vstack(map_tasks(rows, list(itertools.pairwise(ends))), format="csr"))
+    spans = list(itertools.pairwise(ends))
+    parts = map_tasks(rows, spans)
+    begin = offsets(np.array([part.nnz for part in parts]))
+    kind = np.int32 if begin[-1] < np.iinfo(np.int32).max else np.int64
+    data, indices = np.empty(begin[-1], parts[0].dtype), np.empty(begin[-1], kind)
+    indptr = np.zeros(A.shape[0] + 1, kind)
+
+    def place(k: int) -> None:
+        data[begin[k] : begin[k + 1]] = parts[k].data
+        indices[begin[k] : begin[k + 1]] = parts[k].indices
+        indptr[spans[k][0] + 1 : spans[k][1] + 1] = parts[k].indptr[1:] + begin[k]
+
+    map_tasks(place, range(len(parts)))
+    return sp.csr_matrix((data, indices, indptr), shape=(A.shape[0], B.shape[1]))
 
 
 # Matrices in blocks of rows.
@@ -229,17 +242,27 @@ def store_blocks(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
         order = np.lexsort((indices, row))
         blocks, indices = blocks[order], indices[order]
     chunks = rows // _TOGETHER
-    if chunks == 1:
-        values = np.ascontiguousarray(blocks, dtype).ravel()
-    else:
-        values = np.empty(blocks.size, dtype)
-        stretch = values.reshape(-1, columns, _TOGETHER)
-        place = np.arange(len(row)) + (chunks - 1) * A.indptr[row].astype(np.int64)
-        for k in range(chunks):  # of a block's rows, which are stored one after the other
-            stretch[place] = blocks[:, :, k * _TOGETHER : (k + 1) * _TOGETHER]
-            place += np.diff(A.indptr)[row]
     every = np.empty((len(indices), columns), np.uint32)
-    every[:] = indices[:, None] * np.int64(columns) + np.arange(columns)
+    is_shared = chunks == 1 and blocks.dtype == dtype and blocks.flags.c_contiguous
+    values = blocks.ravel() if is_shared else np.empty(blocks.size, dtype)
+
+    def store(span: tuple[int, int]) -> None:
+        part, row_of_part = slice(*span), row[slice(*span)]
+        every[part] = indices[part, None] * np.int64(columns) + np.arange(columns)
+        if is_shared:
+            return
+        if chunks == 1:
+            values.reshape(blocks.shape)[part] = blocks[part]
+            return
+        stretch, counts = values.reshape(-1, columns, _TOGETHER), np.diff(A.indptr)[row_of_part]
+        place = np.arange(*span) + (chunks - 1) * A.indptr[row_of_part].astype(np.int64)
+        for k in range(chunks):  # of a block's rows, which are stored one after the other
+            stretch[place] = blocks[part, :, k * _TOGETHER : (k + 1) * _TOGETHER]
+            place += counts
+
+    count = max(1, min(number_of_threads(), blocks.size // _LEAST))
+    ends = np.linspace(0, len(indices), count + 1).astype(int).tolist()
+    map_tasks(store, list(itertools.pairwise(ends)))
     first = np.arange(0, A.shape[0] + 1, rows, dtype=np.uint32)
     start = (A.indptr * np.int64(columns)).astype(np.uint32)
     offset = (A.indptr * np.int64(rows * columns)).astype(np.uint32)

@@ -242,9 +242,13 @@ class Mesh:
     @cached_property
     def cell_size(self) -> Floats:
         """Longest edge of each cell `(m,)`, length."""
-        x = self.points[self.edges]
-        length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-        return lock(length[self.cell_to_edge].max(axis=1))
+        size = np.zeros(len(self.cells))
+        for part in row_stretches(len(size)):
+            x = self.points[self.cells[part].T]
+            for a, b in local_edges(self.dim):
+                square = sum(v * v for v in (x[b] - x[a]).T)
+                np.maximum(size[part], square, out=size[part])
+        return lock(np.sqrt(size))
 
     @cached_property
     def extent(self) -> float:

@@ -81,11 +81,13 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _add_remainder(data, slot, weight, G, remainder):  # type: ignore[no-untyped-def]
+def _add_remainder(data, low, high, slot, weight, G, remainder):  # type: ignore[no-untyped-def]
     """Add what a stiffness that is not isotropic has besides, at one point of a cell."""
     n, d = G.shape
     half_product = np.empty((d, d, d))
     for a in range(n):
+        if not low <= slot[a, 0] < high:
+            continue
         for i in range(d):
             for j in range(d):
                 for p in range(d):
@@ -103,14 +105,17 @@ def _add_remainder(data, slot, weight, G, remainder):  # type: ignore[no-untyped
 
 @kernel
 def add_block_stiffness(  # type: ignore[no-untyped-def]
-    data, cells, slot, gradient, volume, derivative, bary, weight, factor, lam, mu, remainder
-):
-    """Add the elastic stiffness of plain cells of one material to node blocks.
+    data, low, high, cells, slot, gradient, volume, derivative, bary, weight, factor, lam, mu,
+    remainder,
+):  # fmt: skip
+    """Add the elastic stiffness of plain cells of one material to some rows of node blocks.
 
     Parameters
     ----------
     data : (n_blocks, d, d) array
         Changed in place.
+    low, high : int
+        Blocks of the rows: from one to before the other.
     cells : (k,) array of int
     slot : (m, n, n) array of int
     gradient : (m, d + 1, d) array
@@ -129,6 +134,11 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
     G = np.empty((n, d))
     both = lam + 2.0 * mu
     for e in cells:
+        touched = False
+        for a in range(n):
+            touched |= low <= slot[e, a, 0] < high
+        if not touched:
+            continue
         for q in range(len(weight)):
             w = weight[q] * volume[e]
             if factor is not None:
@@ -143,9 +153,11 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
                         total += derivative[q, a, k] * gradient[e, k, i]
                     G[a, i] = total
             if remainder is not None:
-                _add_remainder(data, slot[e], w, G, remainder)
+                _add_remainder(data, low, high, slot[e], w, G, remainder)
             if d == 2:  # written out: two thirds of the time
                 for a in range(n):
+                    if not low <= slot[e, a, 0] < high:
+                        continue
                     ax, ay = w * G[a, 0], w * G[a, 1]
                     for b in range(n):
                         k = slot[e, a, b]
@@ -157,6 +169,8 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
                         data[k, 1, 1] += both * yy + mu * xx
                 continue
             for a in range(n):
+                if not low <= slot[e, a, 0] < high:
+                    continue
                 for b in range(n):
                     block = data[slot[e, a, b]]
                     dot = 0.0
