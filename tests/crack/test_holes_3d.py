@@ -19,12 +19,17 @@ from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.stations import stations_of
 from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.triangulation import face_areas
 
 H, HALF = 0.1, 0.7  # cells at the crack; half the width of the block
 
 
-def block(path, *holes, h=H):
-    """A block with holes through it or into it, `(x, y, z, height, radius)` or a ball of four."""
+def block(path, *holes, h=H, facets=0):
+    """A block with holes through it or into it, `(x, y, z, height, radius)` or a ball of four.
+
+    Seven numbers are a hole in another direction, `(x, y, z, dx, dy, dz, radius)`; walls have at
+    least so many facets round them.
+    """
     import gmsh
 
     gmsh.initialize(interruptible=False)
@@ -35,7 +40,9 @@ def block(path, *holes, h=H):
         cut = [
             occ.addSphere(*hole)
             if len(hole) == 4
-            else occ.addCylinder(*hole[:3], 0, 0, hole[3], hole[4])
+            else occ.addCylinder(
+                *hole[:3], *(hole[3:6] if len(hole) == 7 else (0, 0, hole[3])), hole[-1]
+            )
             for hole in holes
         ]
         occ.cut([(3, body)], [(3, tag) for tag in cut])
@@ -45,9 +52,13 @@ def block(path, *holes, h=H):
             around = (-2, -2, z - 1e-3, 2, 2, z + 1e-3)
             faces = gmsh.model.getEntitiesInBoundingBox(*around, dim=2)
             gmsh.model.addPhysicalGroup(2, [tag for _, tag in faces], name=name)
-        mesh.setSizeCallback(lambda d, t, x, y, z, lc: h + 0.4 * max(0.0, abs(z) - 0.2))
-        for option in ("ExtendFromBoundary", "FromPoints", "FromCurvature"):
-            gmsh.option.setNumber(f"Mesh.MeshSize{option}", 0)
+        mesh.setSizeCallback(lambda d, t, x, y, z, lc: min(lc, h + 0.4 * max(0.0, abs(z) - 0.2)))
+        for option, value in (
+            ("ExtendFromBoundary", 0),
+            ("FromPoints", 0),
+            ("FromCurvature", facets),
+        ):
+            gmsh.option.setNumber(f"Mesh.MeshSize{option}", value)
         mesh.generate(3)
         gmsh.write(str(path))
     finally:
@@ -140,6 +151,53 @@ def test_blind_holes_cavities_and_several_holes(tmp_path, holes):
     gained = 2 * HALF * steps * da - cut
     assert area[-1] - area[0] == pytest.approx(gained, rel=0.02)
     assert np.diff(area).max() < 2 * HALF * da * 1.02
+
+
+@pytest.mark.parametrize(
+    ("hole", "section"),
+    [
+        # Smaller than a cell; two at an angle to the crack, whose section is an ellipse; a bore
+        # along the crack from x = -0.4 on, which the front is to follow on both sides.
+        pytest.param(
+            (-0.4, 0.1, -0.5, 0, 0, 1, 0.03), np.pi * 0.03**2, id="small", marks=pytest.mark.slow
+        ),
+        pytest.param((-0.9, 0, -0.5, 1, 0, 1, 0.12), np.sqrt(2) * np.pi * 0.12**2, id="tilted"),
+        pytest.param(
+            (-0.4, -0.5, -0.5, 0, 1, 1, 0.12),
+            np.sqrt(2) * np.pi * 0.12**2,
+            id="across",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param((-0.4, 0, 0, 2, 0, 0, 0.12), 2 * 0.119 * 0.8, id="bore"),
+    ],
+)
+def test_small_holes_and_holes_at_an_angle(tmp_path, hole, section):
+    """The front is nowhere ahead of its way, and the area is that of the way without the hole."""
+    mesh = block(tmp_path / "hole.msh", hole, facets=8)
+    body, start, da, steps = Body.of(mesh), -0.7, 0.1, 11
+    crack = place_surface(through_crack(start), mesh)
+    before = area_inside(crack, mesh)
+    for step in range(1, steps + 1):
+        crack = grown(crack, mesh, da)
+        inside = crack.points[body.contains(crack.points)]
+        assert inside[:, 0].max() < start + step * da + 1e-6
+    assert len(crack.fronts) == (2 if hole[0] + hole[3] > 0.8 else 1)
+    gained = 2 * HALF * steps * da - section
+    assert area_inside(crack, mesh) - before == pytest.approx(gained, rel=0.01)
+
+
+def test_no_face_is_a_line_where_one_end_of_a_front_stays(tmp_path):
+    """The end outside at y < -0.7 has no advance, while the front comes to a hole."""
+    mesh = block(tmp_path / "hole.msh", (-0.4, 0.3, -0.5, 1.0, 0.1), facets=8)
+    crack = place_surface(through_crack(-0.55), mesh)
+    body = Body.of(mesh)
+    for _ in range(3):
+        at = stations_of([crack], mesh)
+        size = 0.5 * float(cell_sizes(mesh, at.x).mean())
+        da = np.where(at.x[:, 1] > -0.5, 0.1, 0.0)
+        crack = advance_fronts(crack, at.s, at.front, np.zeros(len(at.s)), da, size, body)
+        assert face_areas(crack.points, crack.faces).min() > 1e-6
+        crack = place_surface(crack, mesh)
 
 
 @pytest.mark.parametrize("start", [-0.4, -0.35])

@@ -392,7 +392,7 @@ def _led_on(
         # What would turn behind the old end stays there: outside, faces need not follow it.
         way = front.stop[rays] - front.start[rays]
         ahead = np.einsum("ij,ij->i", target - front.start[rays], way)
-        stays = ahead < _LEAST * size * np.linalg.norm(way, axis=1)
+        stays = ahead <= _LEAST * size * np.linalg.norm(way, axis=1)
         stop[rays] = np.where(stays[:, None], front.start[rays], target)
         still[rays], outside[rays[bends]] = stays, True
     remains = owner == np.arange(n)

@@ -24,6 +24,8 @@ _SLACK = 0.1  # of a cell, in this
 _BEFORE = 0.25  # of a facet: a wall is as far ahead of what comes to it
 _STRAIGHT = 0.8  # cosine between both parts of a front, drawn across a hole, and the way across
 _AROUND = 32  # directions in which a hole has a wall
+_OPEN = 3  # of these may lead out of it: bores and slots that lie in the plane of a crack
+_ALONG = (0.05, 1.0)  # a way on which depth grows by less, over a cell, leads along a wall
 _MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
 
 
@@ -108,7 +110,7 @@ def open_fronts(
 
 
 def is_enclosed(x: Floats, normal: Floats, body: Body) -> Bools:
-    """Which points outside a body it has all around, in planes: those in holes and cavities.
+    """Which points outside a body it has around, in planes: in holes, cavities, bores and slots.
 
     Parameters
     ----------
@@ -120,7 +122,8 @@ def is_enclosed(x: Floats, normal: Floats, body: Body) -> Bools:
     Returns
     -------
     (n,) array of bool
-        False for points in the body, and before walls that leave a way out, such as notches.
+        False for points in the body, and before walls that leave a wide way out, as a notch does
+        that opens by more than some 35 degrees.
     """
     result = ~body.contains(x)
     if result.any():
@@ -132,7 +135,8 @@ def is_enclosed(x: Floats, normal: Floats, body: Body) -> Bools:
         way = np.cos(angle)[:, None] * one[:, None] + np.sin(angle)[:, None] * other[:, None]
         start = np.repeat(x[result], _AROUND, axis=0)
         crossed, _ = first_crossing(body.boundary, start, start + reach * way.reshape(-1, 3))
-        result[result] = (crossed.reshape(-1, _AROUND) >= 0).all(axis=1)
+        blocked = (crossed.reshape(-1, _AROUND) >= 0).sum(axis=1)
+        result[result] = blocked >= _AROUND - _OPEN
     return result
 
 
@@ -303,7 +307,8 @@ def _straight_out(x: Floats, direction: Floats, size: float, body: Body) -> Floa
 def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, body: Body) -> Floats:
     """Lengths by which points move until they are some cells outside; zero: no way out.
 
-    Where the body begins again before, this is half way across the gap.
+    Where the body begins again before, this is half way across the gap; where a way leads on
+    between walls that are no farther than that, it ends where it begins to.
 
     Parameters
     ----------
@@ -330,7 +335,11 @@ def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, bo
         again = np.nonzero(~outside[first:])[0]
         stop = first + int(again[0]) if len(again) else len(steps)
         deep_enough = np.nonzero(row[first:stop] >= target_depth)[0]
-        if len(deep_enough) and first + deep_enough[0] > 0:
+        last = first + int(deep_enough[0]) if len(deep_enough) else stop - 1
+        along = _way_along_wall(row[first : last + 1])
+        if along is not None:
+            result[k] = steps[first + along]
+        elif len(deep_enough) and first + deep_enough[0] > 0:
             j = first + int(deep_enough[0])
             result[k] = steps[j] - _STEP * (row[j] - target_depth) / (row[j] - row[j - 1])
         elif len(again):
@@ -338,6 +347,16 @@ def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, bo
         else:
             result[k] = steps[first] + target_depth
     return result * size
+
+
+def _way_along_wall(depth: Floats) -> int | None:
+    """From which sample on a way that has left the body leads along a wall; None: nowhere."""
+    slope, count = _ALONG[0] * _STEP, int(_ALONG[1] / _STEP)
+    flat = np.abs(np.diff(depth)) < slope
+    for run in open_runs(flat):
+        if len(run) >= count and depth[run[0]] > ON:
+            return int(run[0])
+    return None
 
 
 def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> float:
