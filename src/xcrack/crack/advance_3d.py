@@ -31,7 +31,7 @@ from xcrack.crack.front_chain import (
 from xcrack.crack.front_curve import front_curve
 from xcrack.crack.fronts import Front, front_frames, steps
 from xcrack.crack.merging import through_holes
-from xcrack.mesh.distances import first_crossing, surface_distance, triangle_tree
+from xcrack.mesh.distances import first_crossing, front_distance, surface_distance, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import rim, sides
 
@@ -41,6 +41,7 @@ _UPRIGHT = 0.05  # cosine to the expected normal below which a triangle is turne
 _LOST = 0.05  # share of its length that fairing may take from a front before a warning
 _PASSES = 2.0  # of fairing, an advance of one size
 _SHARP = np.cos(np.radians(30.0))  # a front that turns by more has a corner
+_REACH = (1.15, 0.5)  # advances, and sizes, that a new front is at most away from the old one
 _AHEAD = 0.6  # of the size: half as far from this place ahead of a front no crack may lie
 
 
@@ -128,6 +129,8 @@ def advance_fronts(
         path = float(np.linalg.norm(rays[0].stop - rays[0].start, axis=1).max())
         longest = float(da[number == members[0]].max()) if body is None else path
         new = _strip(old, rays, longest, size, n_points, body)
+        if body is not None:
+            _check_reach(old, new.points, float(da[np.isin(number, members)].max()), size, body)
         points.append(new.points)
         faces.append(new.faces)
         parts = [new.front] if len(members) == 1 else _parts(new.front, crack)
@@ -140,6 +143,22 @@ def advance_fronts(
     for k, new in strips:
         _check_free(crack, grown, k, new, size, body, meets)
     return grown
+
+
+def _check_reach(old: Front, x: Floats, da: float, size: float, body: Body) -> None:
+    """Raise where a front in the body has come farther from the old one than it advances."""
+    x = x[body.contains(x)]
+    most = _REACH[0] * da + _REACH[1] * size
+    if not len(x):
+        return
+    away, _, _ = front_distance(x, old.x, old.closed, 4 * most)
+    k = int(np.argmax(away))
+    if away[k] > most:
+        raise GeometryError(
+            f"the front that has come to {_at(x[k : k + 1])} runs over itself, {away[k]:.4g} from "
+            f"where it was with an advance of {da:.4g}: parts that meet behind a hole pass each "
+            "other. Take a smaller da, or smaller cells there."
+        )
 
 
 def _check_folds(crack: Crack) -> None:

@@ -15,7 +15,10 @@ OUTSIDE = 2.0  # cells by which an open front leaves the body
 SMOOTH = np.cos(np.radians(30.0))  # an outline that turns by more has a corner
 _LEAST = 1.25  # cells by which an old front may still be outside, and that an outline is followed
 _REACH = 12.0  # cells within which a way out of the body is sought
-_INSIDE = 4.0  # cells of the body that lie at most on this way
+_INSIDE = (
+    4.0,
+    2.0,
+)  # cells of the body that lie at most on this way, of a new crack and of a grown one
 _STEP = 0.125  # of a cell, in this search
 _SLOPE = (
     0.35  # by which depth falls at least on a way to the wall of a hole: else it leads along it
@@ -25,6 +28,7 @@ _BEFORE = 0.25  # of a facet: a wall is as far ahead of what comes to it
 _STRAIGHT = 0.8  # cosine between both parts of a front, drawn across a hole, and the way across
 _AROUND = 32  # directions in which a hole has a wall
 _OPEN = 3  # of these may lead out of it: bores and slots that lie in the plane of a crack
+_GRAZE = 0.15  # of a cell: a chord behind a hole that cuts off no more of its wall lies in the body
 _ALONG = (0.05, 1.0)  # a way on which depth grows by less, over a cell, leads along a wall
 _MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
 
@@ -66,8 +70,9 @@ def open_fronts(
                 before[int(vertex[-1])] = loop[vertex[last:-1]]
                 continue
             ways = (x, depth, size, outward)
-            first, offset[0] = _led_out(*ways, vertex, old, room, body)
-            stop, offset[-1] = _led_out(*ways, vertex[::-1], old[::-1], room, body)
+            most = _INSIDE[0] if outline.first_time else _INSIDE[1]
+            first, offset[0] = _led_out(*ways, vertex, old, room, most, body)
+            stop, offset[-1] = _led_out(*ways, vertex[::-1], old[::-1], room, most, body)
             last = len(vertex) - 1 - stop
             after[int(vertex[0])] = loop[vertex[1 : first + 1]]
             before[int(vertex[-1])] = loop[vertex[last:-1]]
@@ -169,9 +174,11 @@ def behind_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body)
     outward, normal = _outward_directions(points, faces, outline.loop)
     depth, size = body.depth((x + np.roll(x, -1, axis=0)) / 2)
     for run in runs_of(~outline.is_inside):
-        if outline.candidate[run].all() and (depth[run] <= ON * size[run]).all():
+        if outline.candidate[run].all() and (depth[run] <= _GRAZE * size[run]).all():
             k = run[np.argmax(depth[run])]
-            result[run] = is_at_hole(x[k], -outward[k], normal[k], body)
+            # Before a hole the way back would lead into the body.
+            back = max(0.0, float(_BEFORE * size[k] - depth[k])) * outward[k]
+            result[run] = is_enclosed(x[k : k + 1] - back, normal[k : k + 1], body)[0]
     return result
 
 
@@ -247,11 +254,13 @@ def _led_out(
     vertex: Ints,
     old: Bools,
     room: int,
+    most: float,
     body: Body,
 ) -> tuple[int, Floats]:
     """How a front goes on from its last point `vertex[0]` until it is two cells outside.
 
-    It follows the outline while this is smooth, and always where it was front before (`old`).
+    It follows the outline while this is smooth, and always where it was front before (`old`), or
+    where no way leads out with less than `most` cells of the body on it.
     Returns the number of points along the outline that it takes over, and a vector by which it
     goes on straight from there (zero where the outline itself leads far enough).
     """
@@ -287,24 +296,27 @@ def _led_out(
     ways = [unit(tangent + way), way]
     ways.insert(0 if corner else 2, tangent)
     for direction in ways:
-        offset = _straight_out(x[at], direction, float(size[at]), body)
+        offset = _straight_out(x[at], direction, float(size[at]), most, body)
         closer = float(offset @ across) / width
         if closer > _MEET * width:
             # The front at the other end of this mouth would be met outside the body.
             straight = direction - (direction @ across) * across / width**2
-            offset = _straight_out(x[at], unit(straight + 1e-3 * way), float(size[at]), body)
+            offset = _straight_out(x[at], unit(straight + 1e-3 * way), float(size[at]), most, body)
         if offset.any():
             return leaves, offset
-    return leaves, np.zeros(3)
+    farthest = int(np.argmax(depth[vertex[: room + 1]]))
+    return farthest if depth[vertex[farthest]] > 0 else leaves, np.zeros(3)
 
 
-def _straight_out(x: Floats, direction: Floats, size: float, body: Body) -> Floats:
+def _straight_out(x: Floats, direction: Floats, size: float, most: float, body: Body) -> Floats:
     """Vector by which the end of a front goes on, no shorter than a side; zero: no way out."""
-    length = _way_out(x[None], direction[None], np.array([size]), OUTSIDE, body)[0]
+    length = _way_out(x[None], direction[None], np.array([size]), OUTSIDE, most, body)[0]
     return np.asarray(direction * (max(length, SIDE * size) if length > 0 else 0.0))
 
 
-def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, body: Body) -> Floats:
+def _way_out(
+    x: Floats, direction: Floats, size: Floats, target_depth: float, most: float, body: Body
+) -> Floats:
     """Lengths by which points move until they are some cells outside; zero: no way out.
 
     Where the body begins again before, this is half way across the gap; where a way leads on
@@ -317,6 +329,8 @@ def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, bo
         Of the cells.
     target_depth : float
         Cells that the points shall lie outside.
+    most : float
+        Cells of the body on the way.
     body : Body
 
     Returns
@@ -330,7 +344,7 @@ def _way_out(x: Floats, direction: Floats, size: Floats, target_depth: float, bo
     for k, row in enumerate(every.reshape(len(x), -1) / size[:, None]):
         outside = row > ON
         first = int(np.argmax(outside))
-        if not outside[first] or steps[first] > _INSIDE or (first == 0 and row[1] < row[0]):
+        if not outside[first] or steps[first] > most or (first == 0 and row[1] < row[0]):
             continue
         again = np.nonzero(~outside[first:])[0]
         stop = first + int(again[0]) if len(again) else len(steps)
@@ -403,7 +417,7 @@ def _push_vectors(
     if is_inside.any():
         if first_time:
             _check_nick(x[is_inside], outward[is_inside], depth[is_inside], size[is_inside], body)
-        length = _way_out(x[is_inside], outward[is_inside], size[is_inside], 1.0, body)
+        length = _way_out(x[is_inside], outward[is_inside], size[is_inside], 1.0, _INSIDE[0], body)
         offset[is_inside] = length[:, None] * outward[is_inside]
     return offset
 
