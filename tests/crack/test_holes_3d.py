@@ -186,6 +186,22 @@ def test_small_holes_and_holes_at_an_angle(tmp_path, hole, section):
     assert area_inside(crack, mesh) - before == pytest.approx(gained, rel=0.01)
 
 
+def test_a_front_that_has_just_come_round_a_hole_is_whole(tmp_path):
+    """A chord of it cuts off 0.01 of the wall, as facets do: nothing leaves the body there."""
+    mesh = block(tmp_path / "hole.msh", (-0.45, 0.3, -0.5, 1.0, 0.1), facets=8)
+    round_it = [(-0.466, 0.113), (-0.341, 0.231), (-0.392, 0.376), (-0.445, 0.425), (-0.549, 0.475)]
+    below = [(-0.52, y) for y in np.linspace(-1.0, 0.05, 14)]
+    above = [(-0.555, y) for y in np.linspace(0.56, 1.0, 6)]
+    line = np.array([*below, *round_it, *above])
+    outline = np.array([(-3.0, -1.0), *line, (-3.0, 1.0)])
+    plane = xc.plane_crack(np.column_stack([outline, np.full(len(outline), 0.011)]))
+    front = np.arange(len(line), 0, -1)
+    placed = place_surface(Crack(plane.points, plane.faces, None, (front,)), mesh)
+    assert len(placed.fronts) == 1
+    fresh = placed.points[len(plane.points) :]
+    assert not Body.of(mesh).contains(fresh).any()
+
+
 def test_no_face_is_a_line_where_one_end_of_a_front_stays(tmp_path):
     """The end outside at y < -0.7 has no advance, while the front comes to a hole."""
     mesh = block(tmp_path / "hole.msh", (-0.4, 0.3, -0.5, 1.0, 0.1), facets=8)

@@ -28,7 +28,7 @@ _BEFORE = 0.25  # of a facet: a wall is as far ahead of what comes to it
 _STRAIGHT = 0.8  # cosine between both parts of a front, drawn across a hole, and the way across
 _AROUND = 32  # directions in which a hole has a wall
 _OPEN = 3  # of these may lead out of it: bores and slots that lie in the plane of a crack
-_GRAZE = 0.15  # of a cell: a chord behind a hole that cuts off no more of its wall lies in the body
+_GRAZE = 0.3  # of a facet: a chord behind a hole that cuts off no more of its wall lies in the body
 _ALONG = (0.05, 1.0)  # a way on which depth grows by less, over a cell, leads along a wall
 _MEET = 0.3  # share of a mouth that its ends may come closer to each other outside
 
@@ -176,9 +176,10 @@ def behind_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body)
     for run in runs_of(~outline.is_inside):
         if outline.candidate[run].all() and (depth[run] <= _GRAZE * size[run]).all():
             k = run[np.argmax(depth[run])]
-            # Before a hole the way back would lead into the body.
-            back = max(0.0, float(_BEFORE * size[k] - depth[k])) * outward[k]
-            result[run] = is_enclosed(x[k : k + 1] - back, normal[k : k + 1], body)[0]
+            # Behind a hole the way back leads into it, before one into the body.
+            back = max(_GRAZE + _BEFORE, _BEFORE - float(depth[k] / size[k])) * size[k]
+            behind = (x[k] + x[(k + 1) % len(x)]) / 2 - back * outward[k]
+            result[run] = is_enclosed(behind[None], normal[k : k + 1], body)[0]
     return result
 
 
