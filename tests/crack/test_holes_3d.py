@@ -297,6 +297,29 @@ def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
         assert path.read_bytes() == (part / path.name).read_bytes()
 
 
+def test_K_beside_a_hole_smaller_than_a_cell_is_that_of_a_strip(tmp_path):
+    """A straight front across a hole of half a cell: domains of both parts end at its middle.
+
+    K is that of a long strip pulled apart (Rice, 1967), K² = E' G with the energy of the strip far
+    ahead, between plane stress (free sides) and plane strain. Beside the hole a tenth is left for
+    the first place; domains that reached through the hole gave four times as much.
+    """
+    E, nu, pull, height = 210e3, 0.3, 1e-3, 0.6
+    mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 0, 0, 1, 0.05), h=0.12, facets=8)
+    ends = [xc.displacement("top", (0.0, 0.0, pull)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
+    problem = xc.Problem(
+        mesh, xc.Isotropic(E=E, nu=nu), [through_crack(-0.4)], supports=ends, order=1
+    )
+    with pytest.warns(xc.XcrackWarning, match="clipped"):
+        sif = xc.stress_intensity(xc.solve(problem))
+    assert sif.front.max() == 1
+    inner = sif.K_I[np.abs(sif.x[:, 1]) < 0.5]
+    stress = E * np.sqrt(pull**2 / (2 * height) / (1 - nu**2))
+    strain = E * np.sqrt((1 - nu) / (1 + nu) / (1 - 2 * nu) * pull**2 / (2 * height) / (1 - nu**2))
+    assert stress < inner.mean() < strain
+    assert inner == pytest.approx(inner.mean(), rel=0.1)
+
+
 def test_a_penny_opens_around_a_hole_and_leaves_the_block(tmp_path):
     """A closed front round a hole advances in the body alone; steps are those of circles."""
     mesh = block(tmp_path / "hole.msh", (-0.1, 0, -0.5, 1.0, 0.12))

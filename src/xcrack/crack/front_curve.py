@@ -67,12 +67,15 @@ class FrontCurve:
     place, normal : (4, m, 3) arrays
         Coefficients of the pieces, highest power first.
     closed : bool
+    is_cut : (bool, bool)
+        Whether what lies beyond the first and the last vertex belongs to another front.
     """
 
     breaks: Floats
     place: Floats
     normal: Floats
     closed: bool
+    is_cut: tuple[bool, bool] = (False, False)
 
     @property
     def length(self) -> float:
@@ -134,7 +137,7 @@ class FrontCurve:
         Returns
         -------
         rows : (k,) array of int
-            Which points.
+            Which points; without those beyond ends that are cut.
         feet : FootPoints
             Theirs.
         """
@@ -147,7 +150,11 @@ class FrontCurve:
         rows = np.nonzero(sample >= 0)[0]
         picked = np.ascontiguousarray(x[rows], dtype=float)
         curve = (self.breaks, self.place, self.normal, self.closed)
-        return rows, FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
+        found = FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
+        if not any(self.is_cut):
+            return rows, found
+        own = ~((self.is_cut[0] & (found.s < 0)) | (self.is_cut[1] & (found.s > self.length)))
+        return rows[own], found.chosen(own)
 
     def distance(self, x: Floats, bound: float = np.inf) -> Floats:
         """Distance of points to the samples of the front `(q,)`; inf beyond a bound, length.

@@ -52,6 +52,8 @@ _OUTER = 2.6  # wanted outer radius, in legs of the cells at the front
 # Outer radius in radii of the enriched tube: the error sits in the cells at its rim, and a domain
 # that reaches beyond them makes K of a penny 1 % too low.
 _REACH = 1.05
+_BESIDE = 1.5  # wanted radii from the end of a front within which another one goes on
+_AHEAD = 0.7  # cosine to the front's direction at its end, in which it does
 _BENT = 0.9  # largest outer radius, as a share of the radius of curvature of the front
 _LEAST = 0.8  # legs; the radius of the smallest domain
 # Of the tops of the hats, in legs: most, where the front bends, and at its ends, from where it
@@ -126,6 +128,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     inside = np.nonzero(is_inside(np.array(tip.x)))[0]
     first, last = (0, len(tip.x)) if closed else part_inside(tip.x, inside, is_inside)
     curve = front_curve(tip.x[first:last], tip.frame[first:last], closed)
+    curve = replace(curve, is_cut=_cut_ends(solutions[0], t, curve))
     s = curve.breaks[inside - first]
     x, frame, _ = curve.at(s)
     ends = way_inside(curve, is_inside)
@@ -192,6 +195,40 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     check(solutions, t, values.domain, result)
     warn_of_changes(materials, curve, passes)
     return result
+
+
+def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool]:
+    """Ends of a front beyond which its crack has another, or its own other end, behind a hole.
+
+    Domains would reach through a hole that is smaller than they are.
+    """
+    if curve.closed:
+        return False, False
+    space = solution.space
+    tip = space.tips[t]
+    wanted = _wanted_radius(solution, t)
+    x, frame, _ = curve.at(np.array([0.0, curve.length]))
+    others = [
+        np.array(one.x) for one in space.tips if one.crack == tip.crack and one.number != tip.number
+    ]
+    result = []
+    for e, sign in ((0, -1.0), (1, 1.0)):
+        beyond = np.concatenate([*others, x[[1 - e]]]) - x[e]
+        away = np.linalg.norm(beyond, axis=1)
+        ahead = sign * (beyond @ frame[e, 2])
+        close = (away < _BESIDE * wanted) & (ahead >= _AHEAD * away)
+        result.append(bool(close.any()))
+    return result[0], result[1]
+
+
+def _wanted_radius(solution: Solution, t: int) -> float:
+    """Outer radius of the domains along a front where nothing limits it, length."""
+    tip, space = solution.space.tips[t], solution.space
+    given = solution.problem.numerics.domain
+    if given is not None:
+        return given
+    size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
+    return max(_OUTER * size, _REACH * tip.radius)
 
 
 def _surface_end(
@@ -286,9 +323,7 @@ def front_values(
     space, tip_material = solutions[0].space, materials.references[0]
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
-    wanted = solutions[0].problem.numerics.domain
-    if wanted is None:
-        wanted = max(_OUTER * size, _REACH * tip.radius)
+    wanted = _wanted_radius(solutions[0], t)
     knots = front_nodes(curve, _spacing(curve, ends, size), ends)
     sides = sides_around(solutions, tip.crack, curve, wanted)
     room = _room(solutions[0], t, curve, knots, size)
