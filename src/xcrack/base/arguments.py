@@ -22,6 +22,7 @@ from typing import (
     ParamSpec,
     TypeVar,
     Union,
+    cast,
     get_args,
     get_origin,
     get_type_hints,
@@ -562,19 +563,35 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
     """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
-        signature = inspect.signature(function)
+        parameters = inspect.signature(function).parameters.values()
+        takes_any = any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters)
+        known = [p for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
+        names = [p.name for p in known if p.kind is not inspect.Parameter.KEYWORD_ONLY]
+        every_name = {p.name for p in known}
+        required = {p.name for p in known if p.default is inspect.Parameter.empty}
+
+        @cache
+        def rules() -> dict[str, tuple[Argument, str]]:  # hints may name what is defined later
+            every = arguments_of(function).items()
+            return {
+                name: (one, f"{function.__qualname__}: {name}") for name, one in every if one.rule
+            }
 
         @wraps(function)
         def run(*values: P.args, **named: P.kwargs) -> T:
-            try:
-                given = signature.bind(*values, **named)
-            except TypeError:
+            given = dict(zip(names, values))
+            if (
+                len(values) > len(names)
+                or not given.keys().isdisjoint(named)
+                or not required <= given.keys() | named.keys()
+                or not (takes_any or named.keys() <= every_name)
+            ):
                 return function(*values, **named)  # raises in Python's own words
-            for name, argument in arguments_of(function).items():
-                if name in given.arguments and argument.rule is not None:
-                    what = f"{function.__qualname__}: {name}"
-                    given.arguments[name] = argument.check(given.arguments[name], what, error)
-            return function(*given.args, **given.kwargs)
+            given |= named
+            for name, (argument, what) in rules().items():
+                if name in given:
+                    given[name] = argument.check(given[name], what, error)
+            return cast(Callable[..., T], function)(**given)
 
         run.__doc__ = _with_bounds(function.__doc__, function.__annotations__)
         return run

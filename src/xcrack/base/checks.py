@@ -4,13 +4,16 @@ import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from math import isfinite
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from xcrack.base.arrays import Floats, Ints, Shape, has_shape
 from xcrack.base.errors import MeshError, ProblemError, XcrackError
+
+T = TypeVar("T")
 
 LARGEST = 1e90  # coordinate whose third power is still a number
 
@@ -50,22 +53,23 @@ def number(
     >>> number(3, "paris: m", above=0)
     3.0
     """
-    expectation = "a finite number" + _bounds(above, least, below, most)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
+        expectation = "a finite number" + _bounds(above, least, below, most)
         raise error(f"{what} = {value_text(value)} is not a number: give {expectation}.")
     try:
         result = float(value)
     except OverflowError:
         result = np.inf
     if not (
-        np.isfinite(result)
+        isfinite(result)
         and (above is None or result > above)
         and (least is None or result >= least)
         and (below is None or result < below)
         and (most is None or result <= most)
     ):
+        expectation = "a finite number" + _bounds(above, least, below, most)
         raise error(f"{what} = {value_text(value)} is not possible: give {expectation}.")
     return result
 
@@ -101,6 +105,9 @@ def whole_number(
     >>> whole_number(4, "box: n", least=1)
     4
     """
+    if type(value) is int and abs(value) < 2**63:
+        if (least is None or value >= least) and (most is None or value <= most):
+            return value
     expectation = "a whole number" + _bounds(None, least, None, most)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
@@ -322,6 +329,21 @@ def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -
     if items is None:
         raise error(f"{what} = {value_text(value)}: give a list.")
     return tuple(items)
+
+
+def sound_copy(value: T, **fields: Any) -> T:
+    """A frozen dataclass with other fields, that are sound by their making: none is checked again.
+
+    Parameters
+    ----------
+    value : dataclass
+    **fields
+        Of its fields, in the form in which it keeps them.
+    """
+    result: T = object.__new__(type(value))
+    kept = vars(value)
+    vars(result).update({name: kept[name] for name in type(value).__dataclass_fields__} | fields)  # type: ignore[attr-defined]
+    return result
 
 
 def value_text(value: Any) -> str:

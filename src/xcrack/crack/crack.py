@@ -1,11 +1,12 @@
 """Cracks as values: their faces and their ends; the mesh knows nothing of them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from xcrack.base.arrays import Floats, Ints, Shape, frozen_copy
+from xcrack.base.arrays import Floats, Ints, Shape, frozen_copy, lock
 from xcrack.base.checks import entries, point_coordinates, whole_numbers
 from xcrack.base.errors import GeometryError
 
@@ -87,6 +88,21 @@ class Crack:
         """Number of tips, in 3D of fronts; 0 where they are not decided yet."""
         return len(self.tips or self.fronts or ())
 
+    @cached_property
+    def _tips_and_frames(self) -> tuple[Floats, Floats]:
+        """Tip points and frames in 2D; see `tip_frames`."""
+        tips = self.tips or ()
+        x = np.zeros((len(tips), 2))
+        frame = np.zeros((len(tips), 2, 2))
+        for k, tip in enumerate(tips):
+            first, second = (1, 0) if tip == 0 else (tip - 1, tip)
+            along = self.points[second] - self.points[first]
+            ahead = along / np.linalg.norm(along)
+            left = np.array([-ahead[1], ahead[0]])
+            x[k] = self.points[tip]
+            frame[k] = ahead, (-left if tip == 0 else left)
+        return lock(x), lock(frame)
+
     def __repr__(self) -> str:
         ends = "not placed"
         if self.fronts is not None:
@@ -129,17 +145,7 @@ def tip_frames(crack: Crack) -> tuple[Floats, Floats]:
     frame : (f, d, d) array
         Rows (ahead, normal); the normal points from lip - to lip + at every tip.
     """
-    tips = crack.tips or ()
-    x = np.zeros((len(tips), 2))
-    frame = np.zeros((len(tips), 2, 2))
-    for k, tip in enumerate(tips):
-        first, second = (1, 0) if tip == 0 else (tip - 1, tip)
-        along = crack.points[second] - crack.points[first]
-        ahead = along / np.linalg.norm(along)
-        left = np.array([-ahead[1], ahead[0]])
-        x[k] = crack.points[tip]
-        frame[k] = ahead, (-left if tip == 0 else left)
-    return x, frame
+    return crack._tips_and_frames
 
 
 # Kinks of cracks in 2D: vertices at which a polyline turns by more than a curve's chords do.

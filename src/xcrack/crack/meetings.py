@@ -54,7 +54,8 @@ def last_faces(cracks: Sequence[Crack]) -> Faces:
         before = [crack.points[1 if tip == 0 else tip - 1] for tip in crack.tips or ()]
         tip.append(x)
         anchor.append(np.array(before).reshape(-1, 2))
-        side.append(np.sign(np.linalg.det(frame)) if len(x) else np.zeros(0))
+        (ahead, up), (back, down) = frame.reshape(-1, 2, 2).transpose(1, 2, 0)
+        side.append(np.sign(ahead * down - up * back))
     ends, begins = np.concatenate(tip), np.concatenate(anchor)
     along = ends - begins
     return Faces(

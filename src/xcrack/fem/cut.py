@@ -89,9 +89,8 @@ def _tip_cells(
     owner, bary, side = [], [], []
     lip_cells, lip_bary, entries = [], [], []
     ends = _cut_points(mesh, level_set, cells[crossed], positions, exists)
-    row_of = np.cumsum(crossed) - 1
+    row_of, corners = np.cumsum(crossed) - 1, np.eye(mesh.dim + 1)
     for i, cell in enumerate(cells):
-        corners = [np.eye(mesh.dim + 1)[v] for v in range(mesh.dim + 1)]
         loop: list[Floats] = []
         for v in range(mesh.dim + 1):
             loop.append(corners[v])

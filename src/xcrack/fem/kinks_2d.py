@@ -89,6 +89,7 @@ class Kinks:
 
 
 _NOTHING = lock(np.zeros((0, 3)))
+_CORNERS = lock(np.eye(3))
 NO_KINKS = Kinks(lock(np.zeros((0, 2))), lock(np.zeros(0, np.int64)), _NOTHING, _NOTHING)
 
 
@@ -237,7 +238,7 @@ def _loop(values: Floats) -> list[Floats]:
     """Corners of a triangle and the points between at which a linear function changes sign."""
     loop: list[Floats] = []
     for v in range(3):
-        loop.append(np.eye(3)[v])
+        loop.append(_CORNERS[v])
         a, b = values[v], values[(v + 1) % 3]
         if a * b < 0:
             point = np.zeros(3)

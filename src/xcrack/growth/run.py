@@ -7,6 +7,7 @@ from typing import Unpack
 
 import numpy as np
 
+from xcrack.base.checks import sound_copy
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.measures import crack_size
 from xcrack.crack.meetings import LEAST
@@ -257,7 +258,7 @@ def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step,
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
                 first = _with_validity(rule, first)
-            last = replace(first, warnings=tuple(messages))
+            last = sound_copy(first, warnings=tuple(messages))
             progress.step(last)
             yield last
         else:
@@ -292,7 +293,7 @@ def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step,
                 rule, last = other[0], _with_plan(other[0], other[1] or last)
                 continue
             rule = ahead
-            last = replace(next_step, warnings=tuple(messages))
+            last = sound_copy(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
             if ended:
@@ -425,12 +426,12 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
     """A step with a shorter way ahead, of which the advance of its stations is a share."""
-    shorter = _with_plan(rule, replace(step, control=replace(step.control, length=length)))
+    shorter = _with_plan(rule, sound_copy(step, control=replace(step.control, length=length)))
     plan, before = plan_of(shorter), plan_of(step)
     share = plan.largest / before.largest if before.largest > 0 else 1.0
     if rule.integrator == "euler":  # it recognises its stations by that, to round-off
-        return replace(shorter, da=split(plan.arc, [len(da) for da in step.da]))
-    return replace(shorter, da=tuple(share * da for da in step.da))
+        return sound_copy(shorter, da=split(plan.arc, [len(da) for da in step.da]))
+    return sound_copy(shorter, da=tuple(share * da for da in step.da))
 
 
 def _refuse(step: Step, ended: str) -> None:
@@ -452,7 +453,7 @@ def _with_validity(rule: GrowthRule, step: Step) -> Step:
     """A step with how far elasticity holds at it; warns of what is beyond its limit."""
     if not step.has_left:  # by the material alone: a K_c of the run only says where it ends
         K_c = rule.problem.elasticity.material.K_c
-        step = replace(step, validity=validity_of(rule, step, K_c))
+        step = sound_copy(step, validity=validity_of(rule, step, K_c))
     for alarm in alarms_of_step(rule, step):
         warn(str(alarm))
     return step
@@ -491,7 +492,7 @@ def _step_after(
     try:
         step, reuse = _solved_step(rule, problem, last, reuse, run_state(last).settings, joins)
         arrivals = arrivals_of(rule, last, near, step.cycles - last.cycles)
-        return replace(step, arrivals=arrivals), reuse, ""
+        return sound_copy(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
         return None, reuse, cannot_go_on(last, error)
     except XcrackError as error:
@@ -610,19 +611,19 @@ def _solved_step(
         step, handed_on = _solved_step(rule, problem, last, handed_on, settings, joins, False)
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
-    return replace(step, da=rates.split(da)), handed_on
+    return sound_copy(step, da=rates.split(da)), handed_on
 
 
 def _with_plan(rule: GrowthRule, step: Step) -> Step:
     """A step with the plan of what comes after it."""
     plan = integrator_of(rule).predict(rule, step)
-    step = replace(step, plan=plan)
+    step = sound_copy(step, plan=plan)
     if plan.limit and (plan.limit != "geometry" or rule.problem.mesh.dim == 2):
         return step
     try:
-        return replace(step, plan=with_joins(rule, step, plan))
+        return sound_copy(step, plan=with_joins(rule, step, plan))
     except GeometryError as error:
-        return replace(step, plan=replace(plan, limit="geometry", refusal=str(error)))
+        return sound_copy(step, plan=replace(plan, limit="geometry", refusal=str(error)))
 
 
 def _identities(

@@ -6,6 +6,7 @@ other, so that a change of the one that drives is no event.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -180,14 +181,24 @@ def _positive_power(solves: SolveHistory, values: Floats, s: Floats, exponent: f
 
 def _curve(nodes: Floats, values: Floats, x: Floats) -> Floats:
     """Through values `(k, n)` at logarithms of lengths, at those of others (q, n): `(q, n)`."""
-    line = lagrange(nodes[:2], values[:2], x)
+    if len(nodes) < 2:
+        return lagrange(nodes, values, x)
+    line = _line_shares(nodes, x)
+    result = line[0] * values[0] + line[1] * values[1]
     if len(nodes) < 3:
-        return line
+        return result
     newest = nodes[2:]
-    square = [np.exp(2 * (where - newest)) for where in (nodes[:2], newest, x)]
-    bends = square[2] - lagrange(nodes[:2], square[0], x)
-    whole = square[1] - lagrange(nodes[:2], square[0], newest)
-    return line + (values[2:] - lagrange(nodes[:2], values[:2], newest)) * bends / whole
+    there = _line_shares(nodes, newest)
+    first, last = np.exp(2 * (nodes[:2] - newest))
+    bends = np.exp(2 * (x - newest)) - (line[0] * first + line[1] * last)
+    whole = 1.0 - (there[0] * first + there[1] * last)
+    return result + (values[2:] - (there[0] * values[0] + there[1] * values[1])) * bends / whole
+
+
+def _line_shares(nodes: Floats, x: Floats) -> tuple[Floats, Floats]:
+    """Shares of the values at the first two nodes in the line through them, at `x` (q, n)."""
+    step = nodes[1] - nodes[0]
+    return (x - nodes[1]) / -step, (x - nodes[0]) / step
 
 
 def _lines(nodes: Floats, values: Floats, x: Floats) -> Floats:
@@ -203,10 +214,10 @@ def lagrange(nodes: Floats, values: Floats, x: Floats) -> Floats:
     """Polynomials through values `(k, n)` at nodes `(k, n)`, at `x` (q, n): `(q, n)`."""
     result = np.zeros(x.shape)
     for j in range(len(nodes)):
-        weight = np.ones(x.shape)
+        weight: Any = 1.0
         for i in range(len(nodes)):
             if i != j:
-                weight *= (x - nodes[i]) / (nodes[j] - nodes[i])
+                weight = weight * ((x - nodes[i]) / (nodes[j] - nodes[i]))
         result += weight * values[j]
     return result
 
