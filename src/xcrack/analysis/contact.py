@@ -13,6 +13,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.fem.system import System
 from xcrack.linalg.direct import DirectSystem
 from xcrack.linalg.engine import ContactRows, Engine, SolverState, StateContact
+from xcrack.linalg.products import times, times_transposed
 from xcrack.model.problem import LoadState, Problem
 
 
@@ -266,7 +267,7 @@ def _overlapping_cracks(
         if problem.contact == "on":
             needing.append(c)
             continue
-        gap = model.jumps[c] @ u
+        gap = times(model.jumps[c], u)
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
         if (gap.min(axis=0) >= limit).all():
             continue
@@ -276,7 +277,8 @@ def _overlapping_cracks(
                 material=material_numbers(problem),
             )  # fmt: skip
         trial = trials[c]
-        weak = (trial.values.T @ (lips.weight[:, None] * gap)) / trial.measure[:, None]
+        weighted = times_transposed(trial.values, lips.weight[:, None] * gap)
+        weak = weighted / trial.measure[:, None]
         if (weak.min(axis=0) < limit).any():
             needing.append(c)
     return needing

@@ -282,7 +282,7 @@ def _displacement(solution: Solution) -> Alarm:
     space = solution.space
     n = space.mesh.n_points
     plain = np.ones(n, dtype=bool)
-    plain[np.unique(space.mesh.cells[space.signature != 0])] = False
+    plain[space.mesh.cells[space.signature != 0]] = False
     u = np.linalg.norm(solution.coefficients[:n], axis=1) * (plain if plain.any() else 1)
     node = int(np.argmax(u))
     E = solution.problem.elasticity.largest_modulus
@@ -291,7 +291,7 @@ def _displacement(solution: Solution) -> Alarm:
         remedy += " A modulus in GPa is a thousand times as large in MPa."
     return Alarm(
         "the largest displacement over the size of the body",
-        float(u[node] / np.ptp(space.mesh.points, axis=0).max()),
+        float(u[node] / space.mesh.extent),
         _MOVED,
         f"at {coordinates(space.mesh.points[node])}",
         remedy,

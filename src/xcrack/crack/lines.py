@@ -90,6 +90,8 @@ def crossing_points(a: Floats, b: Floats, is_same_line: bool = False) -> Floats:
     Pieces that lie on each other cross nowhere; see `touching_points`.
     """
     parts = [np.zeros((0, 2))]
+    if is_same_line and len(a) < 4:  # all pieces are neighbours
+        return parts[0]
     s, q = np.diff(b, axis=0)[None], b[None, :-1]
     step = max(_AT_ONCE // max(len(b), 1), 1)
     for first in range(0, len(a) - 1, step):
@@ -120,6 +122,8 @@ def touching_points(a: Floats, b: Floats, reach: float, is_same_line: bool = Fal
     of a vertex do not count.
     """
     parts = [np.zeros((0, 2))]
+    if is_same_line and len(a) < 3:
+        return parts[0]
     for x, line in ((a, b),) if is_same_line else ((a, b), (b, a)):
         step = max(_AT_ONCE // max(len(line), 1), 1)
         for first in range(0, len(x), step):

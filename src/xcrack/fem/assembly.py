@@ -611,7 +611,10 @@ def enriched_stiffness(
         for material, own in elasticity.groups(chunk)
         for batch, _ in space.batches(own)
     )
-    for material, functions, first, weight, G in stream_tasks(tabulated, tasks):
+    # Few points take less time than threads to begin.
+    few = len(points.weight) <= _CHUNK
+    tables = map(tabulated, tasks) if few else stream_tasks(tabulated, tasks)
+    for material, functions, first, weight, G in tables:
         with one_blas_thread():
             stiffness = isotropic_part(material.unit.tensor(d))
             add_stiffness(

@@ -1,12 +1,13 @@
 """Facets split where cracks cross them, and the integration points that neighbours share."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
 from xcrack.base.arrays import Bools, Floats, Ints, offsets
-from xcrack.fem.function_space import FunctionSpace
+from xcrack.fem.function_space import Batch, FunctionSpace
 from xcrack.fem.quadrature import lip_side, quarters, radius_at, segment_points, triangle_points
 from xcrack.mesh.mesh import Mesh, numbers_of
 from xcrack.mesh.simplex import cut_simplices
@@ -202,6 +203,11 @@ class LipPoints:
     def __len__(self) -> int:
         return len(self.weight)
 
+    @cached_property
+    def inside_cells(self) -> bool:
+        """Whether no face lies on a facet of the mesh: both lips of each point are in one cell."""
+        return bool((self.cell[:, 0] == self.cell[:, 1]).all())
+
     def way_from(self, mesh: Mesh, x: Floats) -> Floats:
         """Ways to the points from one place `(q, d)`, exact to round-off of the size of a cell.
 
@@ -235,8 +241,9 @@ def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
 
 
 def _along_line(polyline: Floats, x: Floats, corners: Floats) -> Floats:
-    ends = arc_position(polyline, corners.reshape(-1, 2))
-    return arc_position(polyline, x) - ends.min(initial=np.inf)
+    ends = corners.reshape(-1, 2)
+    s = arc_position(polyline, np.concatenate([ends, x]))
+    return np.asarray(s[len(ends) :] - s[: len(ends)].min(initial=np.inf))
 
 
 def _without_order(points: Floats, x: Floats, corners: Floats) -> Floats:
@@ -268,11 +275,13 @@ def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Int
     list of (functions (k, n), numbers of the points (k,), values (k, n))
         For each lip and batch; the jump at a point is the sum over all entries of the point.
     """
-    result = []
+    result, inside = [], lips.inside_cells
+    batches: list[tuple[Batch, Ints, Ints]] = []
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
         side = lip_side(space, c, cell, lips.bary[:, s], sign)
-        for batch, number, row in space.batches_of_points(cell):
+        batches = batches if inside and s else space.batches_of_points(cell)
+        for batch, number, row in batches:
             N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number], slopes=False)
             result.append((batch.functions[row], number, sign * N))
     return result
@@ -283,15 +292,24 @@ def jump_matrix(
 ) -> sp.csr_matrix:
     """Jump n . [[u]] at the lip points `(q, n_dof)`; with directions `along` (q, d), theirs."""
     direction = lips.normal if along is None else along
-    rows, columns, values = [], [], []
-    for functions, number, N in jump_values(space, c, lips):
+    parts, rows, columns, values = jump_values(space, c, lips), [], [], []
+    if lips.inside_cells:  # both lips have the same functions
+        half = len(parts) // 2
+        pairs = zip(parts[:half], parts[half:], strict=True)
+        parts = [(functions, number, N + other) for (functions, number, N), (*_, other) in pairs]
+    for functions, number, N in parts:
         acts = (functions >= 0) & (N != 0)
         rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
         columns.append(functions[acts])
         values.append(N[acts])
     place = np.concatenate(rows) * np.int64(space.n_functions) + np.concatenate(columns)
-    place, number = np.unique(place, return_inverse=True)
-    jump = np.bincount(number, np.concatenate(values), len(place))
+    jump = np.concatenate(values)
+    if lips.inside_cells:
+        order = np.argsort(place)
+        place, jump = place[order], jump[order]
+    else:
+        place, number = np.unique(place, return_inverse=True)
+        jump = np.bincount(number, jump, len(place))
     differs = jump != 0  # standard functions take one value on both lips of a cell
     point, function = np.divmod(place[differs], space.n_functions)
     d = space.dim

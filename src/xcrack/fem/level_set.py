@@ -178,6 +178,8 @@ def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
 
 def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: float) -> float:
     """Length up to which a ray runs before it meets a polyline."""
+    if len(polyline) < 2:
+        return reach
     a, along = polyline[:-1], np.diff(polyline, axis=0)
     gap = a - origin
     cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]

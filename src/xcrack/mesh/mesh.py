@@ -381,8 +381,10 @@ class Mesh:
                 f"no facet of any cell ({int((number < 0).sum())} in all); mesh body and sets "
                 "together."
             )
+        if name != "boundary":
+            return
         outer = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
-        if name == "boundary" and not np.array_equal(np.unique(number), outer):
+        if not np.array_equal(np.unique(number), outer):
             raise MeshError(
                 f'facet set "boundary" has {len(np.unique(number))} facets, the boundary of the '
                 f"mesh has {len(outer)}: that name means all facets of one cell only, and every "
