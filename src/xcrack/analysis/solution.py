@@ -346,7 +346,7 @@ def fields_at(
     """
     from xcrack.fem.kernels.functions import set_gradients
 
-    coefficients = np.ascontiguousarray(coefficients)
+    coefficients = np.array(coefficients, order="C")  # kernels are compiled for read-only ones anew
     d, states = coefficients.shape[1:]
     u, gradient = np.zeros((len(cell), d, states)), np.zeros((len(cell), d, d, states))
     for number, row, functions, N, G in _tables(space, cell, bary, side):
@@ -367,7 +367,7 @@ def gradients_at(
     """
     from xcrack.fem.kernels.functions import set_gradients
 
-    coefficients = np.ascontiguousarray(coefficients)
+    coefficients = np.array(coefficients, order="C")  # kernels are compiled for read-only ones anew
     d, states = coefficients.shape[1:]
     gradient = np.zeros((len(cell), d, d, states))
     for number, row, functions, _, G in _tables(space, cell, bary, side):

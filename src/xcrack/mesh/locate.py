@@ -29,7 +29,8 @@ def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
     """
     from xcrack.mesh.kernels.location import locate_points
 
-    x = np.ascontiguousarray(np.atleast_2d(np.asarray(x, dtype=float)))
+    # A copy: kernels are compiled for read-only arrays anew.
+    x = np.array(x, dtype=float, order="C", ndmin=2)
     cell, bary = locate_points(
         mesh.points, mesh.cells, mesh.gradient, *mesh.cell_grid, x, _TOLERANCE
     )
@@ -79,7 +80,7 @@ def nearest_boundary(mesh: Mesh, x: Floats) -> tuple[float, float]:
     """Distance of one point to the boundary of a 2D mesh, and the size of the cell there."""
     from xcrack.mesh.kernels.location import nearest_segment
 
-    distance, size = nearest_segment(mesh.points, mesh.boundary, np.ascontiguousarray(x))
+    distance, size = nearest_segment(mesh.points, mesh.boundary, np.array(x))
     return float(distance), float(size)
 
 
