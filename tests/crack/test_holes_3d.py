@@ -258,8 +258,7 @@ def test_ligaments_that_cells_do_not_resolve_are_named(tmp_path):
 def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
     """Both arms have the same K: the body is symmetric, its cells (1.9 a radius) are not.
 
-    In the step that touches the hole K in the last ligament is more than cells resolve: there the
-    means are farther apart.
+    They are 4.6 % apart in the step that touches the hole, .7 and 2.8 % after it.
     """
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, 0.25), h=0.13)
     ends = [xc.displacement("top", (0.0, 0.0, 1e-3)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
@@ -281,7 +280,7 @@ def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
     assert 2 in counts
     assert counts[-1] == 1
     assert np.median(apart) < 0.04
-    assert max(apart) < 0.2
+    assert max(apart) < 0.07
     joined = len(counts) - counts[::-1].index(2)
     (join,) = run.joins
     assert (join.step, join.cracks, join.N) == (joined, (0, 0), run.steps[joined].cycles)
