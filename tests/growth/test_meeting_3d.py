@@ -239,3 +239,16 @@ def test_a_front_leaves_room_to_an_arm_that_ends_beside_it(seed):
     assert row["kind"] == "met and gone on"
     assert row["K is nan"] == 0
     assert row["unbalanced"] < 0.02
+
+
+@pytest.mark.parametrize(("seed", "end"), [(4, "an arm"), (12, "one crack"), (29, "an arm")])
+def test_fronts_steeper_than_45_degrees_meet(seed, end):
+    """Drawn pairs at 61, 56 and 87 degrees: an arm on a front that is led on, or one front.
+
+    Energy through the meeting to 2 % (discretisation).
+    """
+    row = drawn_pairs.growing_row(seed)
+    assert row["kind"] == "met and gone on"
+    assert row["came to"] == end
+    assert row["K is nan"] == 0
+    assert row["unbalanced"] < 0.02

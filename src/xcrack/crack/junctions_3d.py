@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from xcrack.base.arguments import Part, Whole, check_arguments
 from xcrack.base.arrays import Bools, Floats
@@ -23,6 +24,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.triangulation import sides
 
 _LED = 2.2  # cells beyond it, to which a front that comes to its face is led
+_BESIDE = 1.0  # cells beyond their smallest distance, up to which a front is led on before another
 _LEG = 3**-0.5  # leg of a cell over its longest edge
 
 
@@ -330,7 +332,13 @@ def led_through(
 
 
 def with_room(
-    cracks: Sequence[Crack], c: int, on: int, body: Body, room: float, size: float
+    cracks: Sequence[Crack],
+    c: int,
+    on: int,
+    body: Body,
+    room: float,
+    size: float,
+    x: Floats | None = None,
 ) -> Crack:
     """The crack on which crack c ends, its fronts led on where that one comes too near to them.
 
@@ -344,15 +352,15 @@ def with_room(
         In cells, that is to lie between the front and what ends before it.
     size : float
         Of the sides of the new front, in cells.
+    x : (n, 3) array, length, optional
+        Places for which there is to be room, in place of the fronts of crack c.
 
     Returns
     -------
     Crack
         Not placed again; the same one where there is room.
     """
-    x = np.concatenate([cracks[c].points[front] for front in cracks[c].fronts or ()])
-    x = x[body.contains(x)]
-    x = x[is_before(cracks, c, x)]
+    x = _front_points(cracks, c, body) if x is None else x
     fronts = front_frames(cracks[on])
     s, number, da, cells = [], [], [], []
     for f, front in enumerate(fronts):
@@ -379,6 +387,61 @@ def with_room(
     return replace(grown, ends_on=cracks[on].ends_on)
 
 
+def face_led_on(
+    cracks: Sequence[Crack], c: int, on: int, body: Body, way: float, size: float
+) -> Crack | None:
+    """Crack `on`, its fronts led straight on where those of crack c are close beside them.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+        With fronts.
+    c, on : int
+    body : Body
+    way : float
+        In cells, by which they are led on where that is closest.
+    size : float
+        Of the sides of the new front, in cells.
+
+    Returns
+    -------
+    Crack or None
+        Not placed again; None where no front is near.
+    """
+    x = _front_points(cracks, c, body)
+    if not len(x):
+        return None
+    fronts = front_frames(cracks[on])
+    y = np.concatenate([np.zeros((0, 3)), *(front.x for front in fronts)])
+    is_inside = body.contains(y)
+    if not is_inside.any():
+        return None
+    cell = body.cell_size(y)
+    away = np.where(is_inside, cKDTree(x).query(y)[0], np.inf)
+    beside = (away - away.min()) / (_BESIDE * cell)
+    ways = way * cell * np.maximum(1 - beside**2, 0.0)
+    spacing = size * float(cell[ways > 0].mean())
+    s = np.concatenate([front.s for front in fronts])
+    number = np.repeat(np.arange(len(fronts)), [len(front.x) for front in fronts])
+    grown = advance_fronts(cracks[on], s, number, 0 * ways, ways, spacing)
+    return replace(grown, ends_on=cracks[on].ends_on)
+
+
+def _front_points(cracks: Sequence[Crack], c: int, body: Body) -> Floats:
+    """Points of the fronts of a crack in the body, before cracks on which it ends `(n, 3)`."""
+    x = np.concatenate([np.zeros((0, 3)), *(cracks[c].points[f] for f in cracks[c].fronts or ())])
+    x = x[body.contains(x)]
+    return np.asarray(x[is_before(cracks, c, x)])
+
+
+def front_distance_of(cracks: Sequence[Crack], i: int, k: int, body: Body) -> float:
+    """Smallest distance of the fronts of two cracks in cells there; inf where one has none."""
+    x, y = (_front_points(cracks, c, body) for c in (i, k))
+    if not len(x) or not len(y):
+        return np.inf
+    return float((cKDTree(y).query(x)[0] / body.cell_size(x)).min())
+
+
 def crossings(one: Crack, other: Crack) -> Floats:
     """Points at which edges of either surface cross the other one `(n, 3)`."""
     parts = [np.zeros((0, 3))]
@@ -402,6 +465,8 @@ __all__ = [
     "crossings",
     "distance_to_side",
     "face_ahead",
+    "face_led_on",
+    "front_distance_of",
     "is_before",
     "led_through",
     "may_touch",

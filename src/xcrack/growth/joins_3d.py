@@ -1,7 +1,7 @@
-"""Cracks in 3D that lie in one surface join as soon as their fronts meet; one front goes on."""
+"""Cracks in 3D join as soon as they meet: in one surface one front goes on, else one is an arm."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
@@ -13,7 +13,10 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.junctions_3d import (
     FaceAhead,
+    crossings,
     face_ahead,
+    face_led_on,
+    front_distance_of,
     is_before,
     led_through,
     may_touch,
@@ -34,6 +37,7 @@ from xcrack.crack.merging import (
     without_inner_front,
 )
 from xcrack.crack.placing_3d import meeting_points, place_arm, place_arms
+from xcrack.fem.system import discretise
 from xcrack.growth import euler, fronts
 from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import interpolate_along_front
@@ -42,6 +46,7 @@ from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
 from xcrack.growth.step import Join, Plan, Step, StepError, plan_of, solves_of
+from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.mesh import Mesh
 
@@ -51,7 +56,14 @@ _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be
 _WIDER = 0.75  # of a gap: the disc is as large where a step leads across
 _STEEP = 0.5  # of the height of a step of a cell or more: the gap over which it leads
 _AHEAD = 1.8  # legs of cells before a face in which no front can be solved: it is led through
+_ACROSS = 2.6  # legs of cells, the same where another front beside it is led on to be its face
+_NARROW = 0.6  # legs of cells behind the nearest place, that are led to a front that is led on too
+_BREAKS = 2.5  # cells: farther a front is not led on at once for an arm to end on its face
+_LEAD = 1.5  # cells by which that one is led on to see where both meet
+_TILT = np.cos(np.radians(60.0))  # fronts tilted by up to that join where no arm can be
+_FLAT = np.cos(np.radians(20.0))  # fronts tilted by more may end on each other
 _ROOM = 0.75  # cells between an arm and the front of the crack on which it ends: less breaks
+_PARTS = (0.75, 0.5, 0.25)  # of the way to where fronts meet that can neither join nor be arms
 _LEFT = 0.25  # of a cell: the gap that is closed at once
 _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined front
 _SPACING = 0.5  # of a cell, between the points of a new front
@@ -67,7 +79,9 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     """A plan in which cracks that meet within its advance are joined.
 
     The advance ends where the first two fronts are a quarter of a cell apart, which is closed. What
-    ends on a face close to the front of that crack breaks the ligament: that front is led on.
+    ends on a face close to the front of that crack breaks the ligament: that front is led on. So
+    it is where fronts in other planes come too close to be solved: one ends on the face of the
+    other, or, where both would run past the other's front, they become one crack.
 
     Parameters
     ----------
@@ -90,7 +104,8 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     close = _close_pairs(plan.cracks, body, step.corrected)
     facing = {pair for pair, _, _ in close}  # their fronts join; faces are those of other pairs
     faces = [pair for pair in _faces_met(plan.cracks, body) if pair not in facing]
-    if not close and not faces:
+    beside = [pair for pair in _pairs_beside(plan.cracks, body) if pair not in {*facing, *faces}]
+    if not close and not faces and not beside:
         return plan
     hindrance = _hindrance(rule) if close else ""
     if hindrance:
@@ -100,39 +115,99 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     time, way, plain = min(
         [_shares_at_meeting(rule, step, plan, *each, body, m) for each in close]
         + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
+        + [_met_face(rule, step, plan, *pair, body, m, True) for pair in beside]
     )
-    now = _advanced(rule, step, plan, way)
-    cycles = time * plan.cycles / _gain(step, now, rule.problem.mesh, m)
+    now, part = _joined_cracks(rule, _advanced(rule, step, plan, way), facing, beside, body), 1.0
+    for less in _PARTS if now.failed else ():  # fronts that overlap may join while they are apart
+        before = _advanced(rule, step, plan, less * way)
+        sooner = _joined_cracks(rule, before, facing, [*beside, *now.failed], body)
+        if not sooner.failed:
+            now, part = sooner, less
+            break
+    if now.failure is not None:
+        if _pairs_beside(plan.cracks, body):
+            raise now.failure
+        return plan  # beside each other by a cell or more they go on, and end on faces later
+    if not now.places:
+        return plan
+    way, time, plain = part * way, part * time, part * plain
+    cycles = time * plan.cycles / _gain(step, now.apart, rule.problem.mesh, m)
     unsure = UNKNOWN[3] * abs(plain * plan.cycles - cycles)
-    apart, joins = tuple(now), []
-    for met in _faces_near(now, body, _AHEAD):
-        pair = (min(met.crack, met.on), max(met.crack, met.on))
-        if pair in facing or may_touch(now, met.crack, met.on):
+    joins = [
+        Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), pair)
+        for pair, x in now.places
+    ]
+    return replace(
+        plan, part=way, cycles=cycles, error=unsure, cracks=tuple(now.cracks),
+        apart=tuple(now.apart), joins=tuple(joins),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Joined:
+    """Cracks that have joined.
+
+    Attributes
+    ----------
+    apart, cracks : sequence of Crack
+        Before, and after.
+    places : list of (pair of int, (3,) array)
+        Which have met, and where, length.
+    failed : list of pair of int
+        Which are too close to be solved, but could not join.
+    failure : GeometryError or None
+        Why two fronts could not become one.
+    """
+
+    apart: Sequence[Crack]
+    cracks: Sequence[Crack]
+    places: list[tuple[tuple[int, int], Floats]]
+    failed: list[tuple[int, int]]
+    failure: GeometryError | None = None
+
+
+def _joined_cracks(
+    rule: GrowthRule,
+    apart: Sequence[Crack],
+    facing: Collection[tuple[int, int]],
+    beside: Sequence[tuple[int, int]],
+    body: Body,
+) -> _Joined:
+    """Cracks of which some become arms on faces ahead of them, and others one; see `with_joins`."""
+    now, places, failed = list(apart), [], []
+    ahead = [(min(met.crack, met.on), max(met.crack, met.on)) for met in _faces_near(now, body)]
+    steep = set(facing)  # and those of which neither can be an arm: their fronts join if they can
+    for pair in dict.fromkeys([*ahead, *beside]):
+        if pair in facing or may_touch(now, *pair):
             continue
-        now[met.crack] = led_through(now, met.crack, met.on, body, _AHEAD, _SPACING)
-        now[met.crack] = place_arm(now, met.crack, rule.problem.mesh)
-        host = with_room(now, met.crack, met.on, body, _ROOM, _SPACING)
-        if host is not now[met.on]:
-            now[met.on] = host
-            now = place_arms(now, rule.problem.mesh)
-        joins.append(Join(step.index + 1, step.cycles + cycles, tuple(met.x.tolist()), pair))
+        arm = _with_arm(rule, now, pair, body)
+        if arm is None or not arm[2]:
+            if _steep_pairs(now, [pair], body) and not _hindrance(rule):
+                steep.add(pair)
+                continue
+            failed.append(pair)
+        if arm is not None:
+            now = arm[0]
+            places.append((pair, arm[1]))
     number = list(range(len(now)))
-    while pairs := _close_pairs(now, body):
+    while pairs := _close_pairs(now, body) + _steep_pairs(now, _numbers(steep, number), body):
         (i, k), gap, size = pairs[0]
         other = now[k] if gap.turn > 0 else turned_crack(now[k])
         across = STEP * size if gap.offset > OFFSET * size else 0.0
-        radius = max(_RADIUS * size, _WIDER * gap.width)
-        now[i] = merged_crack(now[i], other, radius, _SPACING * size, across, body)
-        x = tuple(gap.x.tolist())
-        joins.append(Join(step.index + 1, step.cycles + cycles, x, (number[i], number[k])))
-        now = renumbered_arms(now, i, k, gap.turn > 0)
-        del number[k]
-    if not joins:
-        return plan
-    return replace(
-        plan, part=way, cycles=cycles, error=unsure, cracks=tuple(now), apart=apart,
-        joins=tuple(joins),
-    )  # fmt: skip
+        radius, met = max(_RADIUS * size, _WIDER * gap.width), (number[i], number[k])
+        try:
+            now[i] = merged_crack(now[i], other, radius, _SPACING * size, across, body)
+        except GeometryError as failure:  # of tilted fronts whose gap has no outline one is an arm
+            arm = _with_arm(rule, now, (i, k), body) if abs(gap.turn) < _FLAT else None
+            if arm is None:
+                return _Joined(apart, now, places, [*failed, met], failure)
+            now = arm[0]
+            failed += [] if arm[2] else [met]
+        else:
+            now = renumbered_arms(now, i, k, gap.turn > 0)
+            del number[k]
+        places.append((met, gap.x))
+    return _Joined(apart, now, places, failed)
 
 
 # Fronts of one crack: those that close around a ligament, and those that come to face each other.
@@ -235,10 +310,10 @@ def joined(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -
     )
 
 
-def _faces_near(cracks: Sequence[Crack], body: Body, reach: float) -> list[FaceAhead]:
-    """Faces of others within some legs of cells straight ahead of fronts, nearest first."""
+def _faces_near(cracks: Sequence[Crack], body: Body) -> list[FaceAhead]:
+    """Faces of others close ahead of fronts, nearest first."""
     near = [
-        face_ahead(cracks, c, on, body, reach)
+        face_ahead(cracks, c, on, body, _AHEAD)
         for c, on in permutations(range(len(cracks)), 2)
         if not may_touch(cracks, c, on)
     ]
@@ -247,7 +322,7 @@ def _faces_near(cracks: Sequence[Crack], body: Body, reach: float) -> list[FaceA
 
 def _faces_met(cracks: Sequence[Crack], body: Body) -> list[tuple[int, int]]:
     """Pairs of cracks of which one has come to the face of the other, or through it."""
-    pairs = {(min(m.crack, m.on), max(m.crack, m.on)) for m in _faces_near(cracks, body, _AHEAD)}
+    pairs = {(min(m.crack, m.on), max(m.crack, m.on)) for m in _faces_near(cracks, body)}
     for i, k in combinations(range(len(cracks)), 2):
         if (i, k) not in pairs and not may_touch(cracks, i, k) and _cross(cracks, i, k, body):
             pairs.add((i, k))
@@ -259,18 +334,147 @@ def _cross(cracks: Sequence[Crack], i: int, k: int, body: Body) -> bool:
     return bool((is_before(cracks, i, x) & is_before(cracks, k, x)).any()) if len(x) else False
 
 
+def _with_arm(
+    rule: GrowthRule, cracks: Sequence[Crack], pair: tuple[int, int], body: Body
+) -> tuple[list[Crack], Floats, bool] | None:
+    """Cracks of which one of a pair is an arm on the other, and where; None if neither can be.
+
+    Of both ways, and of the front that is led on where no face is ahead, the first that the mesh
+    can cut.
+    """
+    first = None
+    for met, face in _arms_to_be(cracks, pair, body):
+        try:
+            now = _led_through(cracks, met, face, body)
+            first = (now, met.x, False) if first is None and face is None else first
+            if face is not None and _lead(cracks[met.on], now[met.on], body) > _BREAKS:
+                continue
+            discretise(replace(rule.problem, cracks=tuple(now)))
+        except GeometryError:
+            continue
+        return now, met.x, True
+    return first
+
+
+def _steep_pairs(
+    cracks: Sequence[Crack], pairs: Collection[tuple[int, int]], body: Body
+) -> list[tuple[tuple[int, int], FrontGap, float]]:
+    """Those of some pairs whose fronts touch tilted by up to 60 degrees; as of `_close_pairs`."""
+    result = []
+    for pair in sorted(pairs):
+        if may_touch(cracks, *pair):
+            continue
+        gap = gap_between(cracks[pair[0]], cracks[pair[1]], body, np.inf)
+        if gap is None or not gap.faces or abs(gap.turn) < _TILT:
+            continue
+        size = float(body.cell_size(gap.x[None])[0])
+        if gap.offset <= STEP * size and gap.width < _NEAR * size:
+            result.append((pair, gap, size))
+    return result
+
+
+def _numbers(pairs: Collection[tuple[int, int]], number: Sequence[int]) -> list[tuple[int, int]]:
+    """Pairs of cracks by the places of their numbers, where both are still there."""
+    return [(number.index(i), number.index(k)) for i, k in pairs if {i, k} <= set(number)]
+
+
+def _arms_to_be(
+    cracks: Sequence[Crack], pair: tuple[int, int], body: Body
+) -> Iterator[tuple[FaceAhead, Crack | None]]:
+    """Faces ahead of the fronts of either of two cracks; then those of fronts that are led on."""
+    both = (pair, pair[::-1])
+    met = [face_ahead(cracks, c, on, body, _AHEAD) for c, on in both]
+    yield from ((one, None) for one in sorted(filter(None, met), key=lambda one: one.width))
+    beside = (_face_beside(cracks, c, on, body) for c, on in both)
+    yield from (each[1:] for each in sorted(filter(None, beside), key=lambda each: each[0]))
+
+
+def _face_beside(
+    cracks: Sequence[Crack], c: int, on: int, body: Body
+) -> tuple[float, FaceAhead, Crack] | None:
+    """What the front of crack c meets if that of `on` is led on: how far that is beyond it."""
+    face = face_led_on(cracks, c, on, body, _LEAD, _SPACING)
+    if face is None:
+        return None
+    now = [face if number == on else crack for number, crack in enumerate(cracks)]
+    met = face_ahead(now, c, on, body, _ACROSS)
+    if met is None:
+        return None
+    tree = triangle_tree(cracks[on].points, cracks[on].faces)
+    return float(closest_in(tree, met.x[None]).distance[0]), met, face
+
+
+def _led_through(
+    cracks: Sequence[Crack], met: FaceAhead, face: Crack | None, body: Body
+) -> list[Crack]:
+    """Cracks of which one has been led through the face of another one, and ends there.
+
+    Parameters
+    ----------
+    cracks : sequence of Crack
+    met : FaceAhead
+    face : Crack or None
+        That one with its front led on before the other: of it as much stays as the arm needs.
+    body : Body
+    """
+    now, reach = list(cracks), _AHEAD
+    if face is not None:
+        now[met.on], reach = face, met.width / met.leg + _NARROW
+    now[met.crack] = led_through(now, met.crack, met.on, body, reach, _SPACING)
+    if face is not None:
+        line = crossings(now[met.crack], face)
+        line = line[body.contains(line)]
+        now[met.on] = with_room(cracks, met.crack, met.on, body, _ROOM, _SPACING, line)
+    now[met.crack] = place_arm(now, met.crack, body.mesh)
+    host = with_room(now, met.crack, met.on, body, _ROOM, _SPACING)
+    if face is not None or host is not now[met.on]:
+        now[met.on] = host
+        now = place_arms(now, body.mesh)
+    return now
+
+
+def _lead(old: Crack, new: Crack, body: Body) -> float:
+    """Farthest way of new points of a crack from what it was, in cells."""
+    x = new.points[len(old.points) :]
+    if not len(x):
+        return 0.0
+    away = closest_in(triangle_tree(old.points, old.faces), x).distance
+    return float((away / body.cell_size(x)).max())
+
+
+def _pairs_beside(cracks: Sequence[Crack], body: Body) -> list[tuple[int, int]]:
+    """Pairs of cracks whose fronts are closer than can be solved."""
+    return [
+        (i, k)
+        for i, k in combinations(range(len(cracks)), 2)
+        if not may_touch(cracks, i, k) and front_distance_of(cracks, i, k, body) < _NEAR
+    ]
+
+
 def _met_face(
-    rule: GrowthRule, step: Step, plan: Plan, i: int, k: int, body: Body, exponent: float
+    rule: GrowthRule,
+    step: Step,
+    plan: Plan,
+    i: int,
+    k: int,
+    body: Body,
+    exponent: float,
+    beside: bool = False,
 ) -> tuple[float, float, float]:
     """When a front has met the face of another crack, in shares of an advance; as of `_met`.
 
     Before a free face K grows as between two cracks that face each other at twice the distance.
+    Of fronts beside each other one is led on, and the other meets its face.
     """
 
     def face_after(share: float, reach: float) -> FaceAhead | None:
         now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
         if _cross(now, i, k, body):
             return FaceAhead(i, k, 0.0, 1.0, np.zeros(3))
+        if beside:
+            ahead = (_face_beside(now, *pair, body) for pair in ((i, k), (k, i)))
+            nearest = min(filter(None, ahead), key=lambda each: each[0], default=None)
+            return None if nearest is None else nearest[1]
         both = [face_ahead(now, *pair, body, reach) for pair in ((i, k), (k, i))]
         return min(
             (one for one in both if one is not None), key=lambda one: one.width, default=None
