@@ -231,6 +231,32 @@ def test_K_of_crossing_pennies():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("n", "order", "bounds"), [(21, 1, (0.08, 0.06, 0.04)), (13, 2, (0.08, 0.04, 0.025))]
+)
+def test_K_of_arms_by_the_distance_to_the_junction(n, order, bounds):
+    """Within 15 degrees, from there to 45, and beyond; three and two cells a radius.
+
+    What is off by 4 to 5 % from 15 degrees on at order 1 is so by 3.3 % at order 2.
+    """
+    wanted = json.loads((DATA / "crossing_pennies.json").read_text())["fine"]["small"]
+    own = PchipInterpolator([float(a) for a in wanted], list(wanted.values()))
+    centre = np.array((0.013, 0.0, 0.017))
+    large, small = (xc.penny_crack(centre, *each) for each in (((0, 0, 1), 0.6), ((1, 0, 0), 0.3)))
+    cracks = [large, xc.arm(small, 0, 1), xc.arm(small, 0, -1)]
+    crossed = xc.solve(scene(cracks, n, order=order, contact="off"))
+    sifs = [xc.stress_intensity(crossed, c) for c in (1, 2)]
+    x = np.abs(np.concatenate([sif.x for sif in sifs]) - centre)
+    K = np.concatenate([sif.K_I for sif in sifs]) / (2 * 100.0 * np.sqrt(0.3 / np.pi))
+    angle = np.degrees(np.arctan2(x[:, 2], x[:, 1]))
+    error = np.abs(K / own(angle) - 1)
+    parts = np.digitize(angle, (15.0, 45.0))
+    largest = [float(error[parts == part].max()) for part in range(3)]
+    print(f"\n{np.round(largest, 3)}")
+    assert (np.array(largest) < bounds).all()
+
+
+@pytest.mark.slow
 def test_an_arm_may_be_drawn_to_the_face_or_far_beyond():
     """The same arm but for the sides of its outline (discretisation)."""
     angle = np.linspace(0.0, np.pi, 25)
