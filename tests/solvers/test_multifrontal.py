@@ -135,7 +135,7 @@ def test_a_matrix_that_is_not_positive_is_refused():
     assert factorise(sp.csc_matrix(holes @ A @ holes), columns, halves) is None
 
 
-def test_one_pivot_that_is_not_positive_is_found_in_every_front():
+def test_one_pivot_that_is_not_positive_is_refused_in_every_front():
     """In those that loops factor and in those of LAPACK, in their first columns and their last."""
     problem = plane([EDGE])
     A, columns = matrix_of(problem)

@@ -233,9 +233,9 @@ def factorise(
     while lowest <= depth and update_size[height >= lowest].sum() > _MOST:
         lowest += 1
     level = min(max(depth - _SHARED, lowest), depth)
-    is_kept = (height >= lowest) | (height == level) if keep else height == level
-    place, *stacks = places_of_squares(order, rank, begin, height, is_kept, level)
-    own_size = np.where(is_kept, update_size, 0)
+    is_packed = (height >= lowest) | (height == level) if keep else height == level
+    place, *stacks = places_of_squares(order, rank, begin, height, is_packed, level)
+    own_size = np.where(is_packed, update_size, 0)
     used = int(panel_size.sum() + (own_size.sum() if keep else 0))
     chosen_parts = np.ones(len(order), dtype=bool)
     earlier: tuple[Floats, ...] = ()
@@ -255,7 +255,7 @@ def factorise(
         panel = np.where(chosen_parts, panel, before.panel)
         update = np.where(chosen_parts, update, before.update)
     if _factor_subtrees(
-        fronts, panel, update, (place, is_kept, height, chosen_parts), stacks, level
+        fronts, panel, update, (place, is_packed, height, chosen_parts), stacks, level
     ):
         return None
     memory = (*earlier, lock(panels), lock(updates)) if keep else (lock(panels),)
@@ -284,7 +284,7 @@ def _factor_subtrees(
     """
     from xcrack.linalg.kernels.multifrontal import factor_parts
 
-    place, is_kept, height, chosen_parts = parts
+    place, is_packed, height, chosen_parts = parts
     square = np.zeros(len(place), dtype=np.uint64)
     spare: list[Floats] = []
 
@@ -292,7 +292,7 @@ def _factor_subtrees(
         square[begin:end] = np.where(
             chosen[begin:end], room.ctypes.data + 8 * place[begin:end], square[begin:end]
         )
-        return int(factor_parts(fronts, panel, update, square, is_kept, chosen, begin, end))
+        return int(factor_parts(fronts, panel, update, square, is_packed, chosen, begin, end))
 
     def subtree(root: int) -> int:
         begin, end = root + 2 - (2 << level), root + 1

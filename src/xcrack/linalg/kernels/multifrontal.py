@@ -99,7 +99,7 @@ def _add_update(panel, update, source, is_packed, places, m, k, run):  # type: i
 
 
 @kernel
-def factor_parts(fronts, panel, update, square, is_kept, chosen_parts, low_part, high_part):  # type: ignore[no-untyped-def]
+def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_part, high_part):  # type: ignore[no-untyped-def]
     """Factor parts of a tree, and hand their updates upwards.
 
     Parameters
@@ -109,7 +109,7 @@ def factor_parts(fronts, panel, update, square, is_kept, chosen_parts, low_part,
     panel, update, square : (parts,) arrays of uint64
         Addresses of the panel, of the packed update matrix of a part that is kept, and of the room
         of `(b, b)` that it is made in. They are written to; panels must be zero.
-    is_kept, chosen_parts : (parts,) arrays of bool
+    is_packed, chosen_parts : (parts,) arrays of bool
         Parts whose update matrices are packed, and parts to factor; the panels and update matrices
         of others are there.
     low_part, high_part : int
@@ -155,9 +155,9 @@ def factor_parts(fronts, panel, update, square, is_kept, chosen_parts, low_part,
         p = order[t]
         if 2 * p <= parts:
             for child in (rank[2 * p], rank[2 * p + 1]):
-                source = update[child] if is_kept[child] else square[child]
+                source = update[child] if is_packed[child] else square[child]
                 places = in_parent[begin[child] : begin[child + 1]]
-                _add_update(panel[t], square[t], source, is_kept[child], places, m, k, run)
+                _add_update(panel[t], square[t], source, is_packed[child], places, m, k, run)
         size[0], size[1], size[2] = m, k, b
         beyond = panel[t] + np.uint64(8 * k)
         if k <= _NARROW:
@@ -177,7 +177,7 @@ def factor_parts(fronts, panel, update, square, is_kept, chosen_parts, low_part,
                 _subtract_products(target, beyond + np.uint64(8 * c), np.uint64(8 * m), k, b - c)
         elif k > 0 and b > 0:
             dsyrk(lower, plain, rest, pivots, minus, beyond, rows, one, square[t], rest)
-        if is_kept[t]:
+        if is_packed[t]:
             packed = numba.carray(doubles_at(update[t]), (b * (b + 1) // 2,))
             to = 0
             for j in range(b):
@@ -692,7 +692,7 @@ def heights(order, rank):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def places_of_squares(order, rank, begin, height, is_kept, level):  # type: ignore[no-untyped-def]
+def places_of_squares(order, rank, begin, height, is_packed, level):  # type: ignore[no-untyped-def]
     """Where the update matrix of each part is made: in stacks, which parts take in postorder.
 
     Even and odd levels have a stack each, so that a part and its children never share one. Subtrees
@@ -714,9 +714,9 @@ def places_of_squares(order, rank, begin, height, is_kept, level):  # type: igno
         most[stack] = max(most[stack], top[stack] + size)
         if h > 0:
             for child in (rank[2 * p], rank[2 * p + 1]):
-                if not is_kept[child]:
+                if not is_packed[child]:
                     top[2 * (h - 1 > level) + (h - 1) % 2] -= (begin[child + 1] - begin[child]) ** 2
-        if not is_kept[t]:
+        if not is_packed[t]:
             top[stack] += size
     for t in range(len(order)):
         if height[t] % 2 == 1:
