@@ -283,12 +283,12 @@ PROBLEMS = {
     "order": (lambda: problem(order=3), "order = 3: give 1 or 2"),
     "load state": (
         lambda: xc.solve(problem(), states=[NAN]),
-        "load state = nan is not possible: give a finite number, or a list of loads",
+        "load state = nan is not possible: give a finite number; a list of loads will do too",
     ),
     "no load state": (lambda: xc.solve(problem(), states=[]), "states is empty: give at least one"),
     "load state of words": (
         lambda: xc.solve(problem(), states=["half"]),
-        "load state = 'half' is not a number: give a finite number, or a list",
+        "load state = 'half' is not a number: give a finite number; a list",
     ),
     "a nan place": (
         lambda: xc.point_force((NAN, 1.0), (0.0, 1.0)),

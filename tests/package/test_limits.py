@@ -12,6 +12,8 @@ import sys
 import warnings
 from pathlib import Path
 
+import pytest
+
 import xcrack as xc
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -31,18 +33,18 @@ KINDS = {
 
 
 def product():
-    """Files without the package of proofs, with their trees."""
+    """Files without the package of proofs, with the nodes of their trees."""
     return {
-        p: ast.parse(p.read_text(encoding="utf-8"))
+        p: list(ast.walk(ast.parse(p.read_text(encoding="utf-8"))))
         for p in FILES
         if p.relative_to(SOURCE).parts[0] != "verification"
     }
 
 
-def stored_names(trees):
+def stored_names(nodes):
     names = set()
-    for tree in trees.values():
-        for node in ast.walk(tree):
+    for of_file in nodes.values():
+        for node in of_file:
             if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
                 names.add(node.id if isinstance(node, ast.Name) else node.attr)
             elif isinstance(node, ast.arg):
@@ -52,17 +54,17 @@ def stored_names(trees):
     return names
 
 
-def one_word_names(trees):
-    return sum(bool(re.fullmatch(r"_*[a-z]{3,}", name)) for name in stored_names(trees))
+def one_word_names(nodes):
+    return sum(bool(re.fullmatch(r"_*[a-z]{3,}", name)) for name in stored_names(nodes))
 
 
-def questions_for_kinds(trees):
+def questions_for_kinds(nodes):
     """isinstance, match and comparisons of type on loads, laws and their parts."""
     count = 0
-    for path, tree in trees.items():
+    for path, of_file in nodes.items():
         package = path.relative_to(SOURCE).parts[0]
         kinds = {k for home, names in KINDS.items() if home != package for k in names.split()}
-        for node in ast.walk(tree):
+        for node in of_file:
             asks = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance"
             if asks or isinstance(node, ast.MatchClass):
                 names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
@@ -70,7 +72,7 @@ def questions_for_kinds(trees):
     return count
 
 
-def rules_outside_of_declarations(trees):
+def rules_outside_of_declarations(nodes):
     """Calls that check a value where a field or an argument could declare its rule.
 
     A function of a value, `what` to call it and the `error` to raise belongs to a rule itself.
@@ -86,17 +88,17 @@ def rules_outside_of_declarations(trees):
         return own + sum(calls(child, is_rule) for child in ast.iter_child_nodes(node))
 
     return sum(
-        calls(tree, False)
-        for path, tree in trees.items()
+        calls(of_file[0], False)
+        for path, of_file in nodes.items()
         if path.relative_to(SOURCE).parts[0] not in ("base", "growth", "runs")
     )
 
 
-def tables_of_dimension(trees):
+def tables_of_dimension(nodes):
     return sum(
         isinstance(node, ast.Dict)
         and {getattr(key, "value", None) for key in node.keys} == {2, 3}
-        for tree in trees.values() for node in ast.walk(tree)
+        for of_file in nodes.values() for node in of_file
     )  # fmt: skip
 
 
@@ -111,18 +113,18 @@ test_files_with_private_imports.__test__ = False
 
 def measured():
     """All static numbers of the limits."""
-    trees = product()
-    lines = {p: p.read_text(encoding="utf-8").count("\n") for p in trees}
+    nodes = product()
+    lines = {p: p.read_text(encoding="utf-8").count("\n") for p in nodes}
     growth = sum(n for p, n in lines.items() if p.relative_to(SOURCE).parts[0] == "growth")
     return {
         "packages": len(PACKAGES),
         "files": len(FILES),
         "lines without verification": sum(lines.values()),
         "lines of growth": growth,
-        "one-word names": one_word_names(trees),
-        "questions for kinds": questions_for_kinds(trees),
-        "rules outside of declarations": rules_outside_of_declarations(trees),
-        "tables of dimension": tables_of_dimension(trees),
+        "one-word names": one_word_names(nodes),
+        "questions for kinds": questions_for_kinds(nodes),
+        "rules outside of declarations": rules_outside_of_declarations(nodes),
+        "tables of dimension": tables_of_dimension(nodes),
         "test files with private imports": test_files_with_private_imports(),
     }
 
@@ -206,6 +208,8 @@ def ways():
     return {f"{name}: {what}": n for name, both in numbers.items() for what, n in both.items()}
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_no_way_has_grown(request):
     """In an interpreter of its own: what other tests have left behind changes the ways.
 
@@ -227,6 +231,8 @@ def test_no_way_has_grown(request):
     check(numbers, "ways", request)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_files_of_the_walks_are_entered():
     """Those that docs/developing.md lists; what it has in brackets is of 3D."""
     page = (ROOT / "docs" / "developing.md").read_text(encoding="utf-8")

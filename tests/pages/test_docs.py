@@ -8,6 +8,8 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PAGES = ["README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").glob("*.md"))]
+# Seconds each: with the slow tests.
+LONG = ("docs/three_dimensions.md", "docs/weld.md", "docs/life.md")
 MADE = ("gallery/", "reference/", "about/")
 BLOCK = re.compile(r"(<!-- needs gmsh -->\n)?```python\n(.*?)```", re.DOTALL)
 
@@ -16,6 +18,16 @@ def blocks(page):
     """Pairs (needs gmsh, code) of a page."""
     result = BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
     return [(bool(mark), code) for mark, code in result]
+
+
+def pages(needs_gmsh):
+    """Pages with such blocks; those that take seconds are slow."""
+    slow = (pytest.mark.slow, pytest.mark.mission)
+    return [
+        pytest.param(page, marks=slow if page in LONG else ())
+        for page in PAGES
+        if any(gmsh == needs_gmsh for gmsh, _ in blocks(page))
+    ]
 
 
 def run(codes, folder):
@@ -31,14 +43,14 @@ def run(codes, folder):
 
 
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
-@pytest.mark.parametrize("page", [p for p in PAGES if any(not g for g, _ in blocks(p))])
+@pytest.mark.parametrize("page", pages(needs_gmsh=False))
 def test_blocks_run(page, tmp_path):
     run([code for gmsh, code in blocks(page) if not gmsh], tmp_path)
 
 
 @pytest.mark.gmsh
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
-@pytest.mark.parametrize("page", [p for p in PAGES if any(g for g, _ in blocks(p))])
+@pytest.mark.parametrize("page", pages(needs_gmsh=True))
 def test_blocks_with_gmsh_run(page, tmp_path):
     header = "import numpy as np\nimport xcrack as xc\n"
     run([header, *[code for gmsh, code in blocks(page) if gmsh]], tmp_path)

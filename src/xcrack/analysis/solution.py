@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from xcrack.analysis.contact import Contact, ContactSolution
 from xcrack.analysis.plan import Ingredient, Report
-from xcrack.base.arguments import Part
+from xcrack.base.arguments import Part, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, ProblemError
@@ -25,7 +25,7 @@ from xcrack.linalg.engine import Engine, SolverState
 from xcrack.linalg.rigid_motion import Motion
 from xcrack.mesh.locate import barycentric, cells_at, locate
 from xcrack.model.loads import Load
-from xcrack.model.problem import LoadState, Problem, crack_number
+from xcrack.model.problem import CrackNumber, LoadState, Problem, crack_number
 
 # What a solve keeps where errors are asked for: its factor, and the contact of all states.
 
@@ -261,12 +261,14 @@ class Solution:
         cell = cells_at(self.space.mesh, x)
         return initial_stress_at(self, cell, barycentric(self.space.mesh, cell, x), x)
 
-    def opening(self, crack: int = 0) -> Floats:
+    @check_arguments()
+    def opening(self, crack: CrackNumber = 0) -> Floats:
         """Normal opening n . [[u]] `(q,)` at the points `lips[crack].x`, length."""
         crack = crack_number(self.problem, crack, "opening")
         return np.einsum("qd,qd->q", self.jump(crack), self.lips[crack].normal)
 
-    def jump(self, crack: int = 0) -> Floats:
+    @check_arguments()
+    def jump(self, crack: CrackNumber = 0) -> Floats:
         """Displacement of lip + minus that of lip - `(q, d)` at `lips[crack].x`, length."""
         crack = crack_number(self.problem, crack, "jump")
         lips = self.lips[crack]

@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import partial
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, Unpack
 
@@ -19,11 +20,11 @@ from xcrack.analysis.solve import solve
 from xcrack.app import case_values as values
 from xcrack.app.case import METHODS, SOLVERS, read_case
 from xcrack.app.case_tables import FREE
-from xcrack.base.arguments import FileName, Text, arguments_of, check_arguments
-from xcrack.base.checks import entries, value_text
+from xcrack.base.arguments import FilePath, Items, Text, arguments_of, check_arguments
+from xcrack.base.checks import value_text
 from xcrack.base.description import describe, differences
 from xcrack.base.errors import ProblemError, collected_warnings
-from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.base.paths import system_errors, written_whole
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
@@ -55,14 +56,14 @@ _MENDS = {
 @lists_options
 @check_arguments()
 def write_case(
-    path: FileName,
+    path: Annotated[str | PathLike[str], FilePath(is_file=True)],
     problem: ProblemArgument,
     law: Law | None = None,
     criterion: Criterion | None = None,
     cycle: Cycle | Spectrum | None = None,
     da: float | None = None,
     *,
-    states: Any = None,
+    states: Annotated[Sequence[Any] | None, Items()] = None,
     until: str | Sequence[str] | None = None,
     title: Annotated[str | None, Text("a text, or leave it out")] = None,
     **options: Unpack[GrowthOptions],
@@ -109,7 +110,7 @@ def write_case(
     >>> read_case(file).problem.cracks[0].points[1].tolist()
     [0.5, 0.1]
     """
-    file = path_of(path, "write_case: path", error=ProblemError, is_file=True)
+    file = Path(path)
     if unknown := sorted(set(options) - set(GrowthOptions.__annotations__)):
         raise TypeError(f"write_case() got an unexpected keyword argument {unknown[0]!r}")
     given = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, **options}
@@ -235,10 +236,10 @@ class _Writing:
                     table[name] = self._plain(value, name)
         return table
 
-    def states(self, states: Any, what: str) -> list[Any]:
+    def states(self, states: Sequence[Any], what: str) -> list[Any]:
         """Load states: each a factor, or tables of loads."""
         makers, result = values.makers_of(Load), []
-        for n, state in enumerate(entries(states, what)):
+        for n, state in enumerate(states):
             if np.ndim(state) == 0 and not isinstance(state, Load):
                 result.append(self._plain(state, f"{what}[{n}]"))
                 continue

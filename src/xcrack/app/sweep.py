@@ -4,7 +4,6 @@ import csv
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import partial
-from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,10 +13,10 @@ from xcrack.analysis.solution import Solution
 from xcrack.app.case import read_case
 from xcrack.app.case_run import growth_of_case, retarded_lives, solved_case
 from xcrack.app.case_tables import read_tables
-from xcrack.base.arguments import Switch, Whole, check_arguments
+from xcrack.base.arguments import FileName, Switch, Whole, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
-from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.base.paths import system_errors, written_whole
 from xcrack.runs.campaign import Study, campaign, grid, key_of
 from xcrack.runs.run_folder import STEPS
 from xcrack.sif.stress_intensity import stress_intensities
@@ -29,10 +28,10 @@ _MODES = ("K_I", "K_II", "K_III")
 
 @check_arguments()
 def sweep(
-    path: str | PathLike[str],
+    path: FileName,
     values: Mapping[str, Sequence[Any]],
     *,
-    folder: str | PathLike[str] | None = None,
+    folder: FileName | None = None,
     workers: Annotated[int, Whole(least=1, most=1024)] = 1,
     retry: Switch = False,
 ) -> Study:
@@ -75,7 +74,7 @@ def sweep(
     of each crack and state. What is finished stays: the same call goes on after a kill, in a growth
     run with its next step.
     """
-    file = path_of(path, "sweep: path", error=ProblemError)
+    file = Path(path)
     if not isinstance(values, Mapping) or not values:
         raise ProblemError(
             f"sweep: values = {value_text(values)}: give a dict of keys of the file and lists, "
@@ -86,11 +85,7 @@ def sweep(
     if not cases:
         raise ProblemError("sweep: values: a list is empty: give one value a key, at least.")
     title = read_tables(file, cases[0]).text("title", file.stem)  # wrong keys are said at once
-    target = (
-        file.with_name(f"{file.stem}_sweep")
-        if folder is None
-        else path_of(folder, "sweep: folder", error=ProblemError)
-    )
+    target = file.with_name(f"{file.stem}_sweep") if folder is None else Path(folder)
     with system_errors("the scene cannot be read from", file, error=ProblemError):
         text = file.read_text(encoding="utf-8")
     one = partial(run_changed, str(file), text, str(target))

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from xcrack.base.arguments import Items, Points, check_fields
 from xcrack.base.arrays import Floats, Ints, Shape, frozen_copy, lock
-from xcrack.base.checks import entries, point_coordinates, whole_numbers
+from xcrack.base.checks import whole_numbers
 from xcrack.base.errors import GeometryError
 
 
@@ -40,25 +41,23 @@ class Crack:
         Arrays of other shapes, coordinates that are not finite, point numbers out of range.
     """
 
-    points: Floats
+    points: Annotated[Floats, Points((None, None))]
     faces: Ints
     tips: tuple[int, ...] | None = None
-    fronts: tuple[Ints, ...] | None = None
+    fronts: Annotated[tuple[Ints, ...] | None, Items()] = None
     ends_on: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
-        points = point_coordinates(self.points, "Crack: points", (None, None), error=GeometryError)
-        d = points.shape[1]
-        if d not in (2, 3) or not len(points):
-            raise GeometryError(f"Crack: points must be (p, 2) or (p, 3), not {points.shape}.")
-        object.__setattr__(self, "points", frozen_copy(points))
+        check_fields(self, GeometryError)
+        d = self.points.shape[1]
+        if d not in (2, 3) or not len(self.points):
+            raise GeometryError(f"Crack: points must be (p, 2) or (p, 3), not {self.points.shape}.")
         object.__setattr__(self, "faces", self._numbers("faces", self.faces, (None, d)))
         if self.tips is not None:
             tip_numbers = self._numbers("tips", self.tips, (None,))
             object.__setattr__(self, "tips", tuple(tip_numbers.tolist()))
         if self.fronts is not None:
-            given = entries(self.fronts, "Crack: fronts", error=GeometryError)
-            fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(given)]
+            fronts = [self._numbers(f"fronts[{k}]", f, (None,)) for k, f in enumerate(self.fronts)]
             object.__setattr__(self, "fronts", tuple(fronts))
         if not isinstance(self.ends_on, tuple) or len(self.ends_on):
             object.__setattr__(self, "ends_on", _checked_ends(self.ends_on, d))

@@ -561,8 +561,8 @@ def _with_gap_closed(
 ) -> Crack:
     """A crack with faces between those pieces of two groups of fronts that face each other."""
     runs, others = (
-        [(front, run) for front in group for run in _runs(front, flag(front))]
-        for group, flag in zip(pair, blocked)
+        [(front, run) for front in group for run in _runs(front, is_blocked(front))]
+        for group, is_blocked in zip(pair, blocked)
     )
     if not runs or len(runs) != len(others):
         raise GeometryError(

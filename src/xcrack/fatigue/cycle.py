@@ -3,20 +3,39 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import exprel
 
+from xcrack.base.arguments import CheckedBy, Declared, Number
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import entries, number, numbers, value_text
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.model.loads import Load
 
 
+def _load_states(value: Any, what: str, error: type[XcrackError]) -> tuple[Any, ...]:
+    """Load states, checked: each a number, or loads."""
+    states = entries(value, what, error=error)
+    if not states:
+        raise error("Cycle(states=...) takes a list of at least one load state.")
+    return tuple(_load_state(state, f"{what}[{k}]", error) for k, state in enumerate(states))
+
+
+def _load_state(state: Any, what: str, error: type[XcrackError]) -> Any:
+    if isinstance(state, Real):
+        return number(state, what, error=error)
+    loads = entries(state, what, error=error)
+    for load in loads:
+        if not isinstance(load, Load):
+            raise error(f"{what} has {value_text(load)}, which is not a load: see traction.")
+    return state if isinstance(state, list | tuple) else loads
+
+
 @dataclass(frozen=True, eq=False)
-class Cycle:
+class Cycle(Declared):
     """The load states of one cycle.
 
     Parameters
@@ -37,27 +56,20 @@ class Cycle:
     (0.1, 1.0)
     """
 
-    min: float | None = None
-    max: float | None = None
-    states: Sequence[Any] | None = None
+    min: Annotated[float | None, Number()] = None
+    max: Annotated[float | None, Number()] = None
+    states: Annotated[Sequence[Any] | None, CheckedBy(_load_states)] = None
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.states is None:
             if self.min is None or self.max is None:
                 raise ProblemError("Cycle: give min and max, or states=[...].")
-            for name in ("min", "max"):
-                factor = number(getattr(self, name), f"Cycle({name}=...)")
-                object.__setattr__(self, name, factor)
             if not self.min <= self.max:
                 raise ProblemError(f"Cycle({self.min}, {self.max}): give finite min <= max.")
             return
         if self.min is not None or self.max is not None:
             raise ProblemError("Cycle: give min and max, or states=[...], not both.")
-        states = entries(self.states, "Cycle: states")
-        if not states:
-            raise ProblemError("Cycle(states=...) takes a list of at least one load state.")
-        checked = (_load_state(state, f"Cycle: states[{k}]") for k, state in enumerate(states))
-        object.__setattr__(self, "states", tuple(checked))
 
     @property
     def ratio(self) -> float | None:
@@ -74,17 +86,6 @@ class Cycle:
     def load_states(self) -> tuple[Any, ...]:
         """The states as `solve` takes them."""
         return (self.min, self.max) if self.states is None else tuple(self.states)
-
-
-def _load_state(state: Any, what: str) -> Any:
-    """A load state, checked: a number, or a tuple of loads."""
-    if isinstance(state, Real):
-        return number(state, what)
-    loads = entries(state, what)
-    for load in loads:
-        if not isinstance(load, Load):
-            raise ProblemError(f"{what} has {value_text(load)}, which is not a load: see traction.")
-    return state if isinstance(state, list | tuple) else loads
 
 
 def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayLike) -> Floats:

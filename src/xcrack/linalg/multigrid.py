@@ -84,7 +84,7 @@ def star_patches(
     home: Ints,
     n_standard: int,
     diagonal: Floats,
-    entries: Callable[[Ints], sp.csr_matrix],
+    matrix_entries: Callable[[Ints], sp.csr_matrix],
 ) -> Patches:
     """Blocks of the stars of all points at which an enriched function acts.
 
@@ -97,12 +97,12 @@ def star_patches(
         Leading unknowns that are not enriched.
     diagonal : (n,) array
         Of the matrix.
-    entries : callable
+    matrix_entries : callable
         Sorted unknowns (m,) -> their entries of the matrix (m, m).
     """
     members, start = _members(space, home, n_standard)
     used, place = np.unique(members, return_inverse=True)
-    inverse, offset = _inverses(entries(used), place, start)
+    inverse, offset = _inverses(matrix_entries(used), place, start)
     alone = (1 / diagonal).astype(np.float32)
     alone[used] = 0
     short = [each.astype(np.uint32) for each in (members, start)]

@@ -12,8 +12,8 @@ import numpy as np
 
 from xcrack.base.arguments import CheckedBy
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import LARGEST, number, point_coordinates, value_text
-from xcrack.base.errors import GeometryError, XcrackError
+from xcrack.base.checks import point_coordinates, value_text
+from xcrack.base.errors import XcrackError
 from xcrack.base.optional import require_package
 from xcrack.base.units import LENGTH
 
@@ -193,11 +193,6 @@ def graded_size(
         return near_size + (far_size - near_size) * min(1.0, max(0.0, (distance - band) / ramp))
 
     return length
-
-
-def length_of(value: Any, what: str) -> float:
-    """Check that a value is a positive length that gmsh can compute with, and return it."""
-    return number(value, what, above=0, most=LARGEST, error=GeometryError)
 
 
 def polylines(value: Any, what: str, error: type[XcrackError]) -> list[Floats]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from xcrack.base.arguments import Part, Text, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, at
-from xcrack.base.checks import call_function, number, value_text
+from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.mesh.mesh import Mesh, facet_set, sound_mesh
 
@@ -126,15 +126,14 @@ def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
             f"{what}: {value_text(where)}: give a function f(x) -> bools, or two corners of "
             f"{dim} numbers each, None where the box has no end."
         )
-    ends = (-np.inf, np.inf)
-    rows = [
-        [end if v is None else number(v, f"{what}: corner of the box", error=MeshError)
-         for v in corner]
-        for corner, end in zip(corners, ends, strict=True)
-    ]  # fmt: skip
-    lower, upper = np.array(rows)
+    given = [[0.0 if v is None else v for v in corner] for corner in corners]
+    rows = numbers(given, f"{what}: corners of the box", (2, dim), error=MeshError)
+    is_open = np.array([[v is None for v in corner] for corner in corners])
+    lower, upper = np.where(is_open, [[-np.inf], [np.inf]], rows)
     if (lower > upper).any():
-        raise MeshError(f"{what}: the box from {rows[0]} to {rows[1]} is inside out: swap them.")
+        raise MeshError(
+            f"{what}: the box from {lower.tolist()} to {upper.tolist()} is inside out: swap them."
+        )
     return lower, upper
 
 

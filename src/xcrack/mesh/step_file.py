@@ -6,21 +6,20 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import log10
-from os import PathLike
 from pathlib import Path
 from types import ModuleType
 from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.base.arguments import Either, FilePath, Function, Number
+from xcrack.base.arguments import Either, FileName, Function, Number, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import call_function, value_text, whole_numbers
+from xcrack.base.checks import LARGEST, call_function, value_text, whole_numbers
 from xcrack.base.errors import GeometryError, MeshError
-from xcrack.base.paths import path_of, system_errors
+from xcrack.base.paths import system_errors
 from xcrack.base.units import LENGTH
 from xcrack.mesh.curved_facets import lattice, rows_of, with_curves
-from xcrack.mesh.gmsh_session import length_of, session
+from xcrack.mesh.gmsh_session import session
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.parts import box_of
 
@@ -28,15 +27,15 @@ Selector = Callable[[Floats], Any] | Sequence[Any]
 _MOST_POINTS = 5_000_000
 _STRAIGHT = ("Plane", "Line")  # kinds of faces and edges of a shape whose facets are their own
 _ON_BOX = 1e-6  # share of the sides of a box by which a point may lie beside it
+_SIZE = Number(above=0, most=LARGEST, unit=LENGTH)
 _PLANE = 1e-7  # share of the size of a shape within which it lies in a plane z = constant
 
 
+@check_arguments(GeometryError)
 def mesh_step(
-    path: Annotated[str | PathLike[str], FilePath()],
+    path: FileName,
     *,
-    size: Annotated[
-        float | Callable[[Floats], Any], Either(Function(), Number(above=0, unit=LENGTH))
-    ],
+    size: Annotated[float | Callable[[Floats], Any], Either(Function(), _SIZE)],
     sets: Mapping[str, Selector] | None = None,
 ) -> Mesh:
     """Mesh the body in a STEP file with gmsh: tetrahedra, or triangles for a plane sheet.
@@ -72,7 +71,7 @@ def mesh_step(
     MeshError
         gmsh cannot mesh the shape.
     """
-    path = path_of(path, "mesh_step: path")
+    path = Path(path)
     with system_errors("cannot read the STEP file", path):
         head = path.read_bytes()[:1000]
     if b"ISO-10303-21" not in head:
@@ -80,7 +79,6 @@ def mesh_step(
             f"{path.name} is no STEP file (it does not begin with ISO-10303-21): export the part "
             "as STEP AP203, AP214 or AP242."
         )
-    size_at = size if callable(size) else length_of(size, "size")
     if sets is not None and not isinstance(sets, Mapping):
         raise GeometryError(
             "mesh_step: sets must be a dict of names and selectors, such as sets={'hole': lambda "
@@ -89,9 +87,9 @@ def mesh_step(
     _check_reading(path)
     with session() as gmsh:
         dim = _shape(gmsh, path)
-        if not callable(size_at):
-            _check_cost(gmsh, dim, size_at)
-        failures = _set_size(gmsh, size_at)
+        if not callable(size):
+            _check_cost(gmsh, dim, size)
+        failures = _set_size(gmsh, size)
         try:
             gmsh.model.mesh.generate(dim)
         except Exception as error:  # gmsh has no other class
@@ -198,7 +196,7 @@ def _set_size(gmsh: ModuleType, size: float | Callable[[Floats], Any]) -> list[B
                     value = value.item()
                 if isinstance(value, list | tuple) and len(value) == 1:
                     value = value[0]
-                return length_of(value, f"size at {[x, y, z]}")
+                return _SIZE.check(value, f"size at {[x, y, z]}", GeometryError)
             except BaseException as error:
                 failures.append(error)
         return 1e22

@@ -5,7 +5,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -14,6 +13,9 @@ from xcrack.base.arguments import (
     CheckedBy,
     Choice,
     Declared,
+    FileName,
+    Items,
+    Number,
     OneOrMore,
     Part,
     Parts,
@@ -21,7 +23,7 @@ from xcrack.base.arguments import (
     Whole,
     check_arguments,
 )
-from xcrack.base.checks import entries, number, value_text, whole_number
+from xcrack.base.checks import value_text
 from xcrack.base.errors import CoarseMeshError, ProblemError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
@@ -43,6 +45,8 @@ from xcrack.model.material import Material, MaterialSets
 from xcrack.model.numerics import Numerics
 from xcrack.model.reference import ReferenceK
 from xcrack.model.supports import Support
+
+_FACTOR = Number(hint="a list of loads will do too")
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,12 +231,10 @@ class Problem(Declared):
                 scaled_loads.loads + steady, scaled_loads.factors + (1.0,) * len(steady), 1.0
             )
         if isinstance(state, Real | np.ndarray) or np.isscalar(state):
-            try:
-                return scaled_state(self.loads, number(state, "load state"))  # type: ignore[arg-type]
-            except ProblemError as error:
-                raise ProblemError(f"{str(error)[:-1]}, or a list of loads.") from None
+            factor = _FACTOR.check(state, "load state", ProblemError)
+            return scaled_state(self.loads, factor)  # type: ignore[arg-type]
         try:
-            loads = entries(state, "load state")
+            loads = Items().check(state, "load state", ProblemError)
         except ProblemError as error:
             raise ProblemError(f"{str(error)[:-1]} of loads, or a number.") from None
         for load in loads:
@@ -257,7 +259,7 @@ class Problem(Declared):
     @check_arguments()
     def plot(
         self,
-        file: str | Path | None = None,
+        file: FileName | None = None,
         *,
         title: Annotated[str | None, Text("a text, or leave it out", may_be_empty=True)] = None,
     ) -> Any:
@@ -318,19 +320,21 @@ def check_problem(problem: Any, what: str) -> None:
         )
 
 
-def crack_number(problem: Problem, crack: Any, what: str) -> int:
-    """A crack of the problem by number, checked."""
+CrackNumber = Annotated[int, Whole(least=0)]
+
+
+def crack_number(problem: Problem, crack: int, what: str) -> int:
+    """A crack by its number, if the problem has it."""
     n = len(problem.cracks)
     if not n:
         raise ProblemError(
             f"{what}: crack {value_text(crack)}: the problem has no crack: give one with."
         )
-    index = whole_number(crack, f"{what}: crack", least=0)
-    if index >= n:
+    if crack >= n:
         raise ProblemError(
-            f"{what}: crack {value_text(index)}: the problem has {n} crack(s), numbered from 0."
+            f"{what}: crack {value_text(crack)}: the problem has {n} crack(s), numbered from 0."
         )
-    return index
+    return crack
 
 
 __all__ = ["LoadLevel", "LoadState", "scaled_state"]

@@ -12,7 +12,7 @@ from xcrack.base.arrays import Floats
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import FORCE
 from xcrack.crack.measures import measures
-from xcrack.model.problem import crack_number
+from xcrack.model.problem import CrackNumber, crack_number
 
 _NEAR = 1e-6  # of the body: points that lie on a crack
 
@@ -21,7 +21,7 @@ _NEAR = 1e-6  # of the body: points that lie on a crack
 def crack_opening(
     solution: SolutionArgument,
     x: Annotated[ArrayLike | None, Points()] = None,
-    crack: int = 0,
+    crack: CrackNumber = 0,
 ) -> Floats:
     """Distance of the crack faces at points of a crack: CMOD at its mouth, COD elsewhere.
 

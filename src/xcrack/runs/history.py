@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.base import markup
+from xcrack.base.arguments import FileName, check_arguments
 from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element, join_parts, rim, sketch
@@ -340,7 +341,8 @@ class History:
             )
         return body
 
-    def plot(self, kind: str, file: str | Path | None = None) -> Any:
+    @check_arguments()
+    def plot(self, kind: str, file: FileName | None = None) -> Any:
         """Draw the run.
 
         Parameters

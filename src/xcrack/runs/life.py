@@ -1,12 +1,12 @@
 """A life with an error bar."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xcrack.base.arguments import Choice, FileName, check_arguments
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import number, value_text, whole_number
 from xcrack.base.errors import ProblemError, warn
@@ -87,7 +87,12 @@ class Life:
         rows = [(p, self.percentile(p)) for p in levels]
         return np.array(rows, dtype=[("percent", float), ("N", float)])
 
-    def plot(self, kind: str = "cdf", file: str | Path | None = None) -> Any:
+    @check_arguments()
+    def plot(
+        self,
+        kind: Annotated[str, Choice(("cdf", "density"))] = "cdf",
+        file: FileName | None = None,
+    ) -> Any:
         """Draw the lives.
 
         Parameters

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from xcrack.base import markup
+from xcrack.base.arguments import Number, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import number, numbers, value_text, whole_numbers
+from xcrack.base.checks import numbers, value_text, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import require_package
 
@@ -224,9 +225,9 @@ class SIF:
         K[self.closed, 0] = self.spread[self.closed, 0]
         return K
 
-    def scaled(self, factor: float) -> "SIF":
+    @check_arguments()
+    def scaled(self, factor: Annotated[float, Number()]) -> "SIF":
         """K under loads times a factor, where all is in proportion to them."""
-        factor = number(factor, "scaled: factor")
 
         def times(values: Floats | None) -> Any:
             return None if values is None else lock(factor * values)

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution
+from xcrack.base.arguments import Choice, Either, Flag, Whole, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import flag, value_text, whole_number
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.machine import threads
 from xcrack.model.material import Material
@@ -17,8 +18,12 @@ from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.error import with_bars
 from xcrack.sif.sif import SIF, joined_sif
 
+_CrackNumber = Annotated[int, Whole()]
+_Bars = Annotated[bool | str | None, Either(Flag(), Choice((True, False, "front")))]
 
-def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | None = None) -> SIF:
+
+@check_arguments()
+def stress_intensity(solution: Solution, crack: _CrackNumber = 0, error: _Bars = None) -> SIF:
     """K_I, K_II and T at the tips, or K_I to K_III along the fronts of a crack, from two domains.
 
     Parameters
@@ -62,8 +67,9 @@ def stress_intensity(solution: Solution, crack: int = 0, error: bool | str | Non
     return stress_intensities([solution], crack, error)[0]
 
 
+@check_arguments()
 def stress_intensities(
-    solutions: Sequence[Solution], crack: int = 0, error: bool | str | None = None
+    solutions: Sequence[Solution], crack: _CrackNumber = 0, error: _Bars = None
 ) -> list[SIF]:
     """K of several load states that one solve returned; what is geometry is made once.
 
@@ -94,7 +100,6 @@ def stress_intensities(
     """
     solutions = _checked_solutions(solutions)
     space = solutions[0].space
-    crack = whole_number(crack, "crack")
     if not 0 <= crack < len(space.cuts):
         raise ProblemError(
             f"crack {value_text(crack)}: the problem has {len(space.cuts)} crack(s), numbered from "
@@ -123,7 +128,7 @@ def stress_intensities(
         return with_bars(solutions, result, crack, error)
     if error is None:
         error = any(s.factored is not None for s in solutions)
-    elif not flag(error, 'stress_intensity: error, if it is not "front",'):
+    elif not error:
         return result
     return with_bars(solutions, result, crack) if error else result
 

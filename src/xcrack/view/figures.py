@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from io import BytesIO
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +10,7 @@ from xcrack.base.arguments import FileName, Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import in_notebook, require_package
-from xcrack.base.paths import path_of, system_errors, written_whole
+from xcrack.base.paths import system_errors, written_whole
 
 _UNSAVED = "the picture cannot be written to"
 
@@ -88,7 +89,7 @@ def finish_figure(figure: Any, file: Path | None, window: bool, dpi: int = 150) 
     return figure if file is None else file
 
 
-def picture_path(file: Any, caller: str) -> Path | None:
+def picture_path(file: str | PathLike[str] | None, caller: str) -> Path | None:
     """Where a picture goes, if anywhere; its folder is made if it is not there.
 
     Parameters
@@ -105,11 +106,11 @@ def picture_path(file: Any, caller: str) -> Path | None:
     Raises
     ------
     ProblemError
-        No path, or a folder that cannot be made.
+        A folder in place of a file, or one that cannot be made.
     """
     if file is None:
         return None
-    path = path_of(file, f"{caller}: file", error=ProblemError)
+    path = Path(file)
     if not path.suffix:
         if path.name in ("", ".."):
             raise ProblemError(

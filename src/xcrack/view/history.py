@@ -1,10 +1,10 @@
 """Pictures of a growth run."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from xcrack.base.arguments import FileName
 from xcrack.base.arrays import Floats
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
@@ -15,7 +15,7 @@ from xcrack.runs.table import crack_numbers, state_names
 from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 
-def draw(history: History, kind: str, file: str | Path | None) -> Any:
+def draw(history: History, kind: str, file: FileName | None) -> Any:
     """Figure of K, of length over cycles, of the paths or the fronts; saved or shown."""
     kinds = {"K": _draw_K, "a": _draw_a, "path": _draw_path}
     if history.cracks and history.cracks[0].fronts is not None:

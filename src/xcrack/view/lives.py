@@ -1,12 +1,11 @@
 """Pictures of lives, load histories and residual strength."""
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xcrack.base.arguments import Text, check_arguments
+from xcrack.base.arguments import FileName, Part, Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.spectrum import Spectrum
@@ -15,10 +14,8 @@ from xcrack.runs.life import Life
 from xcrack.view.figures import finish_figure, new_figure, picture_path
 
 
-def draw_life(life: Life, kind: str, file: str | Path | None) -> Any:
+def draw_life(life: Life, kind: str, file: FileName | None) -> Any:
     """Figure of the share that has ended over cycles, or of how many end where."""
-    if not isinstance(kind, str) or kind not in ("cdf", "density"):
-        raise ProblemError(f'plot kind = {value_text(kind)}: give "cdf" or "density".')
     N = life.N[np.isfinite(life.N) & (life.N > 0)]
     if not len(N):
         raise ProblemError("there is nothing to draw: no sample ends; give a larger load.")
@@ -58,7 +55,7 @@ def plot_strength(
     strength: NDArray[Any],
     *,
     unit: Annotated[str, Text('what N counts, such as "cycle"')] = "cycle",
-    file: str | Path | None = None,
+    file: FileName | None = None,
 ) -> Any:
     """Draw what `residual_strength` returned: factors on the load over the life, as one curve.
 
@@ -113,7 +110,12 @@ _FEW = 30  # cycles up to which their axis is linear
 _MOST = 400  # points of a history up to which they are joined one by one
 
 
-def plot_spectrum(spectrum: Spectrum, *, file: str | Path | None = None) -> Any:
+@check_arguments()
+def plot_spectrum(
+    spectrum: Annotated[Spectrum, Part(Spectrum, "xc.Spectrum(...)")],
+    *,
+    file: FileName | None = None,
+) -> Any:
     """Draw a load history: its factors in time, and how often each range is exceeded.
 
     Parameters
@@ -132,10 +134,6 @@ def plot_spectrum(spectrum: Spectrum, *, file: str | Path | None = None) -> Any:
     ProblemError
         Something else, a spectrum of named states, or a file that cannot be written.
     """
-    if not isinstance(spectrum, Spectrum):
-        raise ProblemError(
-            f"plot_spectrum: spectrum = {value_text(spectrum)}: give xc.Spectrum(...)."
-        )
     target = picture_path(file, "plot_spectrum")
     cycles = spectrum.cycles
     figure = new_figure((9.0, 3.8), target is None, "plot_spectrum")

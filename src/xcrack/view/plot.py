@@ -23,13 +23,13 @@ from xcrack.base.arguments import (
     check_arguments,
 )
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import one_of, value_text
+from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.optional import in_notebook, require_package
 from xcrack.base.units import LENGTH
 from xcrack.fem.system import discretise
 from xcrack.linalg.engine import SolverState
-from xcrack.model.problem import Problem, crack_number, scaled_state
+from xcrack.model.problem import CrackNumber, Problem, crack_number, scaled_state
 from xcrack.view.figures import Title, picture_path
 from xcrack.view.pyvista_2d import RASTER
 from xcrack.view.scene_2d import FIELDS, SPACE_FIELDS, scene
@@ -69,7 +69,7 @@ def plot(
     edges: Switch = False,
     limits: Annotated[tuple[float, float] | None, Interval()] = None,
     cmap: Annotated[Any, CheckedBy(colour_map)] = None,
-    crack: int | None = None,
+    crack: CrackNumber | None = None,
     clip: Annotated[tuple[Any, Any] | None, CheckedBy(clip_plane, unit=LENGTH)] = None,
     view: Annotated[Any, Direction("the direction from the body to the viewer, (x, y, z)")] = None,
     loads: Switch = False,
@@ -132,7 +132,7 @@ def plot(
         The renderer that was asked for is not installed.
     """
     solution = _solution_to_draw(solution, field)
-    field = one_of(field, "plot: field", _KNOWN[solution.space.dim])
+    Choice(_KNOWN[solution.space.dim]).check(field, "plot: field", ProblemError)
     look = PlotStyle(
         warp=warp,
         title=title,

@@ -1,12 +1,11 @@
 """Picture of growth laws: da/dN over ΔK."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
-from xcrack.base.arguments import Number, Text, check_arguments
+from xcrack.base.arguments import FileName, Number, Text, check_arguments
 from xcrack.base.checks import numbers
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.checks import evaluate_law
@@ -26,7 +25,7 @@ def plot_rates(
     units: Annotated[str, Text('the units of length and K, such as "mm, MPa√mm"')],
     R: Annotated[float, Number(most=1)] = 0.1,
     dK: tuple[float, float] | None = None,
-    file: str | Path | None = None,
+    file: FileName | None = None,
 ) -> Any:
     """Draw da/dN of laws over ΔK, in one picture.
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from numpy.typing import NDArray
 
-from xcrack.base.arguments import FilePath, Number, Part, Text, check_arguments
+from xcrack.base.arguments import CheckedBy, FilePath, Number, Part, Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError, warn
 from xcrack.base.markup import Markup, element, join_parts, list_markup, page
@@ -25,7 +25,7 @@ from xcrack.view import report_results as results
 from xcrack.view import report_safety as safety
 from xcrack.view import report_scene as scene
 from xcrack.view.report_pictures import figure_markup, history_pictures, solution_pictures
-from xcrack.view.report_source import Section, Source, UnitNames, source_of
+from xcrack.view.report_source import Section, Source, UnitNames, path_or_result, source_of
 from xcrack.view.report_summary import summary
 from xcrack.view.report_viewer import viewer
 from xcrack.view.view_3d import history_layers, packed_layers, solution_layers
@@ -35,7 +35,7 @@ _FORMAT = 1
 
 @check_arguments()
 def report(
-    result: Any,
+    result: Annotated[Any, CheckedBy(path_or_result)],
     file: Annotated[str | PathLike[str], FilePath(is_file=True)],
     *,
     title: Annotated[str, Text(may_be_empty=True)] = "",

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -238,6 +239,11 @@ def setting_words(text: str) -> str:
     return _DIGITS.sub(lambda m: f"{float(m[0]):.6g}", _ARRAY.sub(r"\1 numbers, \2", text))
 
 
+def path_or_result(value: Any, what: str, error: type[XcrackError]) -> Any:
+    """The folder of a run as a path; anything else as it is."""
+    return path_of(value, what, error=error) if isinstance(value, str | PathLike) else value
+
+
 def source_of(
     given: Any, title: str, yield_stress: float | None, life: Life | None = None
 ) -> Source:
@@ -250,10 +256,9 @@ def source_of(
     """
     messages: list[str] = []
     with collected_warnings(messages):
-        if isinstance(given, str | PathLike):
-            folder = path_of(given, "report: path", error=ProblemError)
-            given = load(folder)
-            title = title or folder.name
+        if isinstance(given, Path):
+            title = title or given.name
+            given = load(given)
         if isinstance(given, History):
             source = _of_history(given, title, yield_stress)
         else:

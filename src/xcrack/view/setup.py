@@ -1,11 +1,11 @@
 """A picture of a problem before it is solved: body, sets, loads, supports, cracks and normals."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from xcrack.base.arguments import FileName
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.markup import rim
 from xcrack.mesh.mesh import Mesh
@@ -22,7 +22,7 @@ _VIEW = {"elev": 24.0, "azim": -58.0}
 _LOAD, _SUPPORT, _CRACK = "#1b4f9c", "#2a7d2a", "#d6006c"
 
 
-def draw_setup(problem: Problem, file: str | Path | None, title: str | None) -> Any:
+def draw_setup(problem: Problem, file: FileName | None, title: str | None) -> Any:
     """Figure of a problem; saved, shown, or handed to a notebook.
 
     Nothing is solved. Loads that act everywhere are named in the legend.

@@ -18,13 +18,13 @@ from xcrack.fem.quadrature import cell_points
 from xcrack.fem.system import System, build
 from xcrack.linalg.direct import scaled_basis
 from xcrack.mesh.simplex import leg_sizes
-from xcrack.model.problem import ProblemArgument, crack_number
+from xcrack.model.problem import CrackNumber, ProblemArgument, crack_number
 
 
 @check_arguments()
 def inf_sup(
     problem: ProblemArgument,
-    crack: int = 0,
+    crack: CrackNumber = 0,
     *,
     norm: Annotated[str, Choice(("h1", "energy"))] = "h1",
 ) -> float:
