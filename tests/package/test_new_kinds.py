@@ -99,6 +99,8 @@ def test_a_load_solves_gives_K_and_bars_as_the_same_traction():
     assert np.allclose(K.bar, same.bar, rtol=1e-6)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_load_grows_and_is_in_folders_files_pictures_and_reports(tmp_path):
     problem = scene(OWN)
     run = tmp_path / "run"

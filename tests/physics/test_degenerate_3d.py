@@ -14,6 +14,7 @@ import xcrack as xc
 from support import exact
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
+from support.rows import MISSION
 from support.scenes_2d import numerics_of
 from support.scenes_3d import SIX, STEEL, half_sheet, sheet
 
@@ -46,7 +47,10 @@ def test_results_are_continuous_in_the_cut_position():
     assert (np.ptp(result, axis=0)[:2] <= 1e-2 * result[-1, :2]).all()
 
 
-@pytest.mark.parametrize("eps", [1e-2, 1e-6, 1e-9, 1e-12, 1e-14])
+@pytest.mark.parametrize(
+    "eps",
+    [*(pytest.param(eps, marks=pytest.mark.slow) for eps in (1e-2, 1e-9, 1e-12)), 1e-6, 1e-14],
+)
 def test_both_sides_of_a_layer_agree(eps):
     """The scene below is the one above, turned: only the diagonals of the mesh tell them apart."""
     np.testing.assert_allclose(opened(eps), opened(-eps), rtol=1e-3)
@@ -207,7 +211,9 @@ def front_problem(eps, **options):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("scene", [sheet_problem, front_problem], ids=["no front", "front"])
+@pytest.mark.parametrize(
+    "scene", [sheet_problem, pytest.param(front_problem, marks=MISSION)], ids=["no front", "front"]
+)
 def test_condition_number_does_not_depend_on_the_cut(scene):
     result = [scenes.condition(scene(eps)) for eps in (1e-2, 1e-4, 1e-8, 1e-12, 0.0, -1e-6)]
     print(f"\ncondition over cuts: {np.round(result, 2).tolist()}")

@@ -76,13 +76,13 @@ def test_flat_in_mesh_size_with_a_front(norm, meshes, pennies):
 
 
 def test_topological_enrichment_is_no_less_stable():
-    result = [xc.inf_sup(penny(6, k, enrichment="topological")) for k in range(4)]
+    result = [xc.inf_sup(penny(6, k, enrichment="topological")) for k in (0, 3)]
     print(f"\ninf-sup of pennies, topological: {np.round(result, 3).tolist()}")
     assert min(result) >= 0.2
 
 
 # In cells from a line of nodes: on it, a hair behind and ahead of it, in between.
-@pytest.mark.parametrize("norm", ["h1", pytest.param("energy", marks=MISSION)])
+@pytest.mark.parametrize("norm", [pytest.param(norm, marks=MISSION) for norm in ("h1", "energy")])
 def test_front_just_past_nodes(norm):
     """The last strip of lip is 1e-1 ... 1e-12 of a cell wide: it gets no multiplier of its own."""
     result = [
@@ -98,7 +98,7 @@ def test_front_just_past_nodes(norm):
 
 def test_naive_space_fails():
     """One unknown a node: far below, whatever the mesh; it fails for every cut but an exact one."""
-    by_size = [xc.inf_sup(through(n, k, multipliers="naive")) for n in (4, 6, 8) for k in (0, 1)]
+    by_size = [xc.inf_sup(through(n, k, multipliers="naive")) for n in (4, 6) for k in (0, 1)]
     by_cut = [xc.inf_sup(beside_a_layer(eps, multipliers="naive")) for eps in EPS[:6]]
     fronts = [xc.inf_sup(penny(6, k, multipliers="naive")) for k in (0, 1)]
     print(f"\nnaive inf-sup in 3D: {by_size}, {by_cut}, {fronts}")
@@ -107,7 +107,7 @@ def test_naive_space_fails():
 
 def test_units_do_not_matter():
     """The scalar problem is that of a body of unit size: round-off."""
-    small = penny(6, 1)
+    small = penny(4, 1)
     mesh = xc.Mesh(1e3 * small.mesh.points, small.mesh.cells, small.mesh.facet_sets)
     centre, normal, radius = PENNIES[1]
     crack = xc.penny_crack(1e3 * centre, normal, 1e3 * radius)

@@ -67,7 +67,14 @@ def reference():
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("crack", [INNER, SURFACE], ids=["inner", "surface"])
-@pytest.mark.parametrize("change", ["corners", "numbers", "turned", "mirrored"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        *(pytest.param(each, marks=pytest.mark.slow) for each in ("corners", "numbers")),
+        "turned",
+        "mirrored",
+    ],
+)
 def test_K(reference, crack, order, change):
     mesh, to = xc.box((-1, -1, -1), (1, 1, 1), 6), None
     points, cells = mesh.points, mesh.cells

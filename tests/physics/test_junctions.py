@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.rows import slow
 from support.scenes_2d import perturbed
 from xcrack.base.arrays import Floats
 from xcrack.fem.quadrature import sub_cells
@@ -110,7 +111,7 @@ def K_by_tip(solution, order) -> Floats:
     return np.concatenate(K)[np.argsort(order)]
 
 
-@pytest.mark.parametrize("seed", CROSSES)
+@pytest.mark.parametrize("seed", [*slow(*CROSSES)[1:], next(iter(CROSSES))])
 def test_straight_cracks_that_cross(seed):
     """K and energy, whichever crack runs through: order 2 within 5e-4 at n = 20, 1e-4 at 40."""
     K, energy = CROSSES[seed]
@@ -142,10 +143,11 @@ def test_straight_cracks_that_cross_and_press(seed):
         assert np.abs(np.abs(K[:, 1]) - wanted).max() < 2e-3 * wanted.max()
 
 
-def test_straight_crosses_are_accepted():
+@pytest.mark.parametrize("seeds", [range(600, 615), *slow(range(615, 660))], ids=["few", "rest"])
+def test_straight_crosses_are_accepted(seeds):
     """At drawn angles; with ends on the crack, a 20th of a cell short or beyond, or rounded."""
     mesh = xc.box((-1, -1), (1, 1), 20)
-    for seed in range(600, 660):
+    for seed in seeds:
         x, (a, b, c, d) = crossing(seed)
         along = 0.005 * (d - c) / np.linalg.norm(d - c)
         ends = [(x, x), (x - along, x + along), (x + along, x - along), (np.round(x, 3),) * 2]
@@ -190,9 +192,12 @@ def test_crosses_on_mesh_lines():
                 assert change < 1e-3 * np.abs(wanted).max()
 
 
-def test_arms_that_one_edge_crosses_with_the_crack_between():
+@pytest.mark.parametrize(
+    "seeds", [range(2000, 2008), *slow(range(2008, 2030))], ids=["few", "rest"]
+)
+def test_arms_that_one_edge_crosses_with_the_crack_between(seeds):
     """Three cuts of one mesh edge: the body was said to be in two pieces (23 of 300 drawn ones)."""
-    for seed in range(2000, 2030):
+    for seed in seeds:
         rng = np.random.default_rng(seed)
         x, angle = rng.uniform(-0.15, 0.15, 2), rng.uniform(-np.pi, np.pi)
         leans = angle + np.array([1, -1]) * rng.uniform(0.6, np.pi - 0.6, 2)
@@ -266,6 +271,8 @@ def shallow(seed):
     return [(x - a * e, x + b * e), (x, x + c * d), (x - f * d, x)]
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_faces_are_as_long_as_their_cracks():
     """What is beyond a junction is taken away, also where tips are nearer than it is prolonged.
 

@@ -81,6 +81,8 @@ def test_K_and_bars_are_those_of_the_force_at_that_point():
     assert np.allclose(answers[0].bar, answers[1].bar, rtol=1e-9)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_folders_reports_pictures_and_case_files(tmp_path):
     load = xc.line_force("top", "left", (-10.0, 300.0))
     problem = cracked(load)

@@ -10,6 +10,7 @@ import scipy.sparse.linalg as sla
 import xcrack as xc
 from support import exact
 from support import scenes_3d as scenes
+from support.rows import slow
 from support.scenes_2d import numerics_of
 from xcrack.fem.system import build
 from xcrack.linalg import iterative
@@ -20,7 +21,7 @@ from xcrack.verification import methods
 C = np.array([0.013, -0.021, 0.0317])
 
 
-@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (1.0, 2.0, 3.0)], ids=str)
+@pytest.mark.parametrize("normal", [*slow(((0.0, 0.0, 1.0),)), (1.0, 2.0, 3.0)], ids=str)
 def test_contact_patch(normal):
     problem = xc.Problem(
         xc.box((-1, -1, -1), (1, 1, 1), 4),
@@ -100,7 +101,11 @@ def steps(problem):
 
 @pytest.mark.parametrize(
     "problem",
-    [straight(6), tilted(6, nu=0.499), tilted(6, nu=0.49, mesh=scenes.perturbed(6, 3301))],
+    [
+        *slow(straight(6)),
+        tilted(6, nu=0.499),
+        *slow(tilted(6, nu=0.49, mesh=scenes.perturbed(6, 3301))),
+    ],
     ids=["straight", "0.499", "moved, 0.49"],
 )
 def test_no_displacement_has_a_negative_energy(problem):
@@ -182,6 +187,8 @@ def test_steps_do_not_depend_on_the_cut():
     assert max(counts) - min(counts) <= 15
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_steps_near_incompressibility():
     """They grow like those of order 1: 18 and 65 with as many unknowns there."""
     counts = [steps(tilted(7, nu=nu)) for nu in (0.3, 0.45, 0.49)]

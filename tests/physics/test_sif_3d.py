@@ -316,6 +316,8 @@ def test_against_newman_and_raju(corner):
     assert np.abs(sif.K[inner, 1:]).max() <= 0.02 * wanted.max()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_surface_crack_coarse():
     sif, wanted, _ = plate_with_part_through_crack(0.11, corner=False)
     inner = ~sif.at_surface
@@ -334,6 +336,8 @@ def K_of(problem):
     return xc.stress_intensity(xc.solve(problem)).K
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_several_load_states_are_equal_to_one_by_one():
     """One multigrid hierarchy for all: to the tolerance of the iteration (1e-6)."""
     problem, (c, Q) = small()

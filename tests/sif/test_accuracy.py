@@ -13,6 +13,7 @@ from support import exact, outcomes_of_K, scenes_fronts
 from support import scenes_2d as scenes
 from support import scenes_3d as scenes_space
 from support.outcomes_of_K import CLIPPED
+from support.rows import MISSION
 from xcrack.adaptivity.sizes_3d import first_mesh
 from xcrack.mesh.locate import contains, locate
 from xcrack.mesh.simplex import leg_size
@@ -53,7 +54,7 @@ def test_a_clipped_domain_warns_where_errors_are_large(cells, order, warned, err
         assert f"{sif.domain_cells[0]:.1f} cells" in clipped[0]
 
 
-@pytest.mark.parametrize("seed", [3, 5])
+@pytest.mark.parametrize("seed", [3, pytest.param(5, marks=pytest.mark.slow)])
 def test_a_contact_zone_without_weight_does_not_warn(seed):
     """Under pure shear the errors of a mesh press a few places of a penny together."""
     problem, _ = scenes_fronts.flat_scene(0.2, stress=(0.0, 1.0, 0.0), seed=seed, contact="auto")
@@ -62,6 +63,8 @@ def test_a_contact_zone_without_weight_does_not_warn(seed):
     assert not warned
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_the_narrowest_place_of_a_front_is_named():
     """Not its first vertex, which lies outside the body."""
     mesh = scenes_space.perturbed(8, 4, 0.1)
@@ -201,7 +204,9 @@ def test_what_counts_as_a_number_of_a_crack_and_as_a_list(solved):
         np.testing.assert_array_equal(xc.stress_intensities(states)[1].K, K)
 
 
-@pytest.mark.parametrize(("cells", "warned"), [(1.5, True), (2.2, False)])
+@pytest.mark.parametrize(
+    ("cells", "warned"), [pytest.param(1.5, True, marks=MISSION), (2.2, False)]
+)
 def test_a_front_that_bends_within_two_cells_is_named(cells, warned):
     """A penny of so many cells a radius: the place is on it, and the remedy works."""
     problem, _ = flat_crack(0.5 / cells, (1.0, 0.3, 0.2), order=2, contact="off")

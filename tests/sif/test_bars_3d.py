@@ -59,6 +59,8 @@ def test_places_at_a_free_surface_have_none():
     assert all(("surface" in r) == at for r, at in zip(sif.reasons, sif.at_surface, strict=True))
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.parametrize(
     ("n", "tilt"), [(6, 0.3), pytest.param(9, 0.3, marks=pytest.mark.slow),
                     pytest.param(9, 0.0, marks=pytest.mark.slow)]

@@ -119,6 +119,8 @@ def test_many_drawn_tips_on_mesh_points_and_edges():
     check_drawn(range(310500, 310650))
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_drawn_tips_far_from_the_origin():
     """Coordinates have a round-off of 1e-12 of a cell there, more than some distances."""
     check_drawn(range(330000, 330020), origin=1e3)
