@@ -15,15 +15,14 @@ import pytest
 
 import xcrack as xc
 from support.case_texts import STRIP, STRIP_GROWTH, STRIP_PULL
+from xcrack import Closure, GrowthLaw, Load, Material, Threshold
 from xcrack.app import case, case_assessment, case_histories, case_values
 from xcrack.app.case_tables import Source, Table
 from xcrack.base.arguments import arguments_of
 from xcrack.base.description import describe
 from xcrack.base.units import Units
-from xcrack.fatigue.law import Closure, Constants, GrowthLaw, Threshold
+from xcrack.fatigue.law import Constants
 from xcrack.growth.options import GrowthOptions
-from xcrack.model.loads import Load
-from xcrack.model.material import Material
 from xcrack.model.supports import Support
 
 DATA = Path(__file__).resolve().parents[1] / "data"

@@ -7,7 +7,7 @@ import pytest
 
 import xcrack as xc
 from support import scenes_2d as scenes
-from xcrack.mesh.refinement import refine
+from xcrack import refine
 from xcrack.verification.charting.result import Chart, ChartRow
 from xcrack.verification.charting.values import Sampled, at_places, most_trusted, remaining
 

@@ -3,16 +3,9 @@
 import numpy as np
 import pytest
 
+from xcrack import Isotropic, Numerics, Problem, box, line_crack, plate, solve, traction
 from xcrack.analysis.multipliers import multipliers
-from xcrack.analysis.solve import solve
-from xcrack.crack.lines import line_crack
 from xcrack.fem.system import build
-from xcrack.mesh.box import box
-from xcrack.mesh.plates import plate
-from xcrack.model.loads import traction
-from xcrack.model.material import Isotropic
-from xcrack.model.numerics import Numerics
-from xcrack.model.problem import Problem
 
 SXX, SYY, TXY = -100.0, -60.0, 10.0
 SIDES = [

@@ -4,19 +4,23 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from xcrack.base.errors import GeometryError, XcrackWarning
+from xcrack import (
+    Crack,
+    GeometryError,
+    XcrackWarning,
+    box,
+    cycles_between,
+    elliptic_crack,
+    penny_crack,
+)
 from xcrack.crack.advance_3d import advance_fronts
-from xcrack.crack.crack import Crack
 from xcrack.crack.front_chain import along_front
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.lines import crossing_points
 from xcrack.crack.measures import area_inside, front_length_inside, surface_size
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.surfaces import elliptic_crack, penny_crack
-from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth.euler import elapsed_3d
 from xcrack.growth.fronts import interpolate_along_front
-from xcrack.mesh.box import box
 from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces, side_keys
 

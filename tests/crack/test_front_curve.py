@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from support.front_fields import ellipse_front, flat_front
-from xcrack.base.errors import GeometryError
+from xcrack import GeometryError
 from xcrack.crack.front_curve import front_curve
 
 TURN = 2 * np.pi

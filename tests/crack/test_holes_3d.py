@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack import Crack, Mesh
 from xcrack.crack.advance_3d import advance_fronts
-from xcrack.crack.crack import Crack
 from xcrack.crack.measures import area_inside
 from xcrack.crack.placing_3d import place_surface
 from xcrack.crack.stations import stations_of
 from xcrack.mesh.locate import Body, cell_sizes
-from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.triangulation import face_areas
 
 H, HALF = 0.1, 0.7  # cells at the crack; half the width of the block

@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import GeometryError, ProblemError
-from xcrack.crack.measures import Measures
+from xcrack import GeometryError, ProblemError
 
 BOX = xc.box((0, 0, 0), (10, 10, 6), (14, 14, 9))
 CELL = 10 / 14
 
 
-def ellipse(centre: tuple[float, float, float], a: float, b: float) -> Measures:
+def ellipse(centre: tuple[float, float, float], a: float, b: float):
     return xc.measures(xc.elliptic_crack(centre, (0, 1, 0), (1, 0, 0), a, b), BOX)
 
 
-def by_name(m: Measures) -> dict[str, tuple[float, float]]:
+def by_name(m) -> dict[str, tuple[float, float]]:
     return {t.name: (t.length, t.depth) for t in m.traces}
 
 

@@ -7,13 +7,10 @@ up to a side farther out than a circle would touch it.
 import numpy as np
 import pytest
 
-from xcrack.base.errors import GeometryError
-from xcrack.crack.crack import Crack
+from xcrack import Crack, GeometryError, box, penny_crack, plane_crack, surface_crack
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.merging import gap_between, merged_crack, turned_crack
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.surfaces import penny_crack, plane_crack, surface_crack
-from xcrack.mesh.box import box
 from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces
 

@@ -4,19 +4,20 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import GeometryError, XcrackError
-from xcrack.crack.boundary_trace import Body
-from xcrack.crack.crack import Crack
-from xcrack.crack.fronts import front_frames
-from xcrack.crack.placing_3d import check_surfaces, place_surface
-from xcrack.crack.stations import place_crack
-from xcrack.crack.surfaces import (
+from xcrack import (
+    Crack,
+    GeometryError,
+    XcrackError,
     elliptic_crack,
     penny_crack,
     plane_crack,
     read_surface,
     surface_crack,
 )
+from xcrack.crack.boundary_trace import Body
+from xcrack.crack.fronts import front_frames
+from xcrack.crack.placing_3d import check_surfaces, place_surface
+from xcrack.crack.stations import place_crack
 from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, rim, ruled_strip, side_keys
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import xcrack as xc
 from fuzz.entry import Entry, arg
 from fuzz.kinds import Filename, ListOf, Number, Numbers, Of, Seen, Whole, Word, real
-from xcrack.model.loads import Load
+from xcrack import Load
 
 
 def varies(values):

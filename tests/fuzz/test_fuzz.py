@@ -8,8 +8,7 @@ import xcrack as xc
 from fuzz import damage
 from fuzz.kinds import NONSENSE, VALID
 from fuzz.run import PARTS, TABLE, drawn, run, table
-from xcrack.fatigue.law import GrowthLaw, Threshold
-from xcrack.model.loads import Load
+from xcrack import GrowthLaw, Load, Threshold
 from xcrack.model.supports import Condition
 
 _EXEMPT = {

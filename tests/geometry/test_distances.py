@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack.crack import Crack
+from xcrack import Crack, elliptic_crack, penny_crack, plane_crack, surface_crack
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.surfaces import elliptic_crack, penny_crack, plane_crack, surface_crack
 from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.distances import (
     closest_in,

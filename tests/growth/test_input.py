@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import STRESS, formula, mode_I, plate
-from xcrack import Cycle, ProblemError, XcrackWarning, elber, grow, max_hoop_stress, paris, walker
+from xcrack import (
+    Cycle,
+    ProblemError,
+    XcrackWarning,
+    elber,
+    grow,
+    max_hoop_stress,
+    measures,
+    paris,
+    walker,
+)
 from xcrack.base.errors import warn
-from xcrack.crack.measures import length_inside
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -39,7 +48,7 @@ def turning(share):
     """K that turns the path by a third of a degree for each hundredth of K_II / K_I."""
 
     def K_of(problem, c):
-        a = length_inside(problem.placed[c], problem.mesh)
+        a = measures(problem.placed[c], problem.mesh).area
         return [[STRESS * np.sqrt(a), share * STRESS * np.sqrt(a)]]
 
     return K_of

@@ -33,7 +33,6 @@ from xcrack import (
     weighted_angle,
 )
 from xcrack.growth.levels import ladders
-from xcrack.linalg.engine import SolverState
 
 LAW = paris(1e-11, 3.0)
 COARSE = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
@@ -104,7 +103,7 @@ def test_scaled_histories_need_two_states(contact):
     assert step.levels == (-0.3, 1.0)
     (ladder,) = ladders(problem, spectrum, Response(step.levels, step.sif))
     wanted = np.array([-0.2, -0.01, 0.0, 0.03, 0.77])
-    solved = respond(problem, [-0.2, 0.03, 0.77], SolverState()).sif
+    solved = respond(problem, [-0.2, 0.03, 0.77]).sif
     K = ladder.at(wanted)
     for k, state in zip((0, 3, 4), solved):
         assert np.allclose(K[k], state[0].K, rtol=1e-8, atol=1e-7)
@@ -177,8 +176,8 @@ def test_scaled_loads_add_up():
     """The whole state by a list of loads of half the size, and by a factor."""
     problem = scene(contact="off", loads=[*tension(100.0), *bending(30.0)])
     half = [*tension(50.0), *bending(15.0)]
-    by_list = respond(problem, [half], SolverState()).sif
-    by_factor = respond(problem, [0.5], SolverState()).sif
+    by_list = respond(problem, [half]).sif
+    by_factor = respond(problem, [0.5]).sif
     assert np.allclose(by_list[0][0].K, by_factor[0][0].K, rtol=1e-11)
 
 

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import quad
 
 import xcrack as xc
+from xcrack import respond
 from benchmarks.wanted_error import SCENES, against, run, scene
 from xcrack.growth import cells as mesh_cells
 from xcrack.growth.options import run_of as rule_of
-from xcrack.growth.response import respond
 from xcrack.mesh.locate import cell_sizes
 from xcrack.runs import run_folder
 from xcrack.verification.exact.plates import PLATE_EDGE

@@ -319,6 +319,8 @@ def test_files_of_others_in_the_place_of_steps(whole, tmp_path):
         assert_same(history, whole)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_flipped_bits_are_noticed(whole):
     """A hundred places, drawn: the step is computed again, or the bit was one of padding."""
     before = content(whole.path)

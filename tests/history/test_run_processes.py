@@ -140,6 +140,8 @@ def test_no_space_for_a_real_process(processes, whole, tmp_path):
     assert_finished(folder, expected)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_ctrl_c_for_a_real_process(processes, whole, tmp_path):
     folder = tmp_path / "run"
     pid = processes.start(folder, hold=3)

@@ -2,10 +2,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from xcrack.base.errors import GeometryError, MeshError
-from xcrack.mesh.cylinder import notched_cylinder
+from xcrack import GeometryError, Mesh, MeshError, notched_cylinder
 from xcrack.mesh.gmsh_session import import_gmsh, session
-from xcrack.mesh.mesh import Mesh
 
 ROUND_OFF = 1e-12
 RADIUS, DEPTH, ANGLE = 10.0, 2.0, np.pi / 3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import MeshError, ProblemError, XcrackError
+from xcrack import MeshError, ProblemError, XcrackError
 
 SEED = 1602
 ROUND_OFF = 1e-10

@@ -3,10 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from xcrack.base.errors import MeshError, XcrackError, XcrackWarning
-from xcrack.mesh.box import box
-from xcrack.mesh.files import read_mesh, write_mesh
-from xcrack.mesh.mesh import Mesh
+from xcrack import Mesh, MeshError, XcrackError, XcrackWarning, box, read_mesh, write_mesh
 
 # Files that gmsh, meshio and pyvista wrote: data/make.py.
 DATA = Path(__file__).parents[1] / "data"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import MeshError, XcrackError, XcrackWarning
+from xcrack import MeshError, XcrackError, XcrackWarning
 from xcrack.mesh.linear import SHAPES, linear_mesh
 from xcrack.mesh.raw import RawMesh, mesh_from_raw
 

@@ -3,9 +3,8 @@ import pickle
 import numpy as np
 import pytest
 
-from xcrack.base.errors import MeshError
-from xcrack.mesh.box import box
-from xcrack.mesh.mesh import Mesh, local_edges, local_facets
+from xcrack import Mesh, MeshError, box
+from xcrack.mesh.mesh import local_edges, local_facets
 
 ROUND_OFF = 1e-12  # sums of a few hundred volumes, each exact to 1e-16
 BOXES = [((-1.0, 0.5), (2.0, 1.5), (5, 4)), ((0.0, -1.0, 2.0), (1.0, 1.0, 2.5), (3, 4, 2))]

@@ -6,12 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from xcrack import (
+    GeometryError,
+    Mesh,
+    MeshError,
+    XcrackError,
+    XcrackWarning,
+    plate,
+    plate_with_hole,
+    read_mesh,
+)
 from xcrack.base import optional
-from xcrack.base.errors import GeometryError, MeshError, XcrackError, XcrackWarning
-from xcrack.mesh.files import read_mesh
 from xcrack.mesh.gmsh_session import SYSTEM_LIBRARIES, graded_size, import_gmsh, polylines, session
-from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.plates import plate, plate_with_hole
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "meshes"
 SIDES = ["left", "right", "bottom", "top"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import GeometryError, XcrackError
+from xcrack import GeometryError, XcrackError
 
 pytestmark = pytest.mark.gmsh
 R = 2.0

@@ -6,7 +6,8 @@ import warnings
 import numpy as np
 import pytest
 
-from xcrack.base.errors import XcrackWarning, warn
+from xcrack import XcrackWarning
+from xcrack.base.errors import warn
 
 
 def inner(function):

@@ -13,9 +13,9 @@ import xcrack as xc
 from fuzz.entry import Argument
 from fuzz.kinds import NONSENSE, VALID
 from fuzz.run import TABLE
+from xcrack import MeshError, ProblemError
 from xcrack.base import arguments as rules
 from xcrack.base.checks import call_function, number, numbers, whole_number, whole_numbers
-from xcrack.base.errors import MeshError, ProblemError
 
 
 class Hostile:

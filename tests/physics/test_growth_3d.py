@@ -8,7 +8,7 @@ import pytest
 
 import xcrack as xc
 from support import scenes_fronts as fronts
-from xcrack.runs.collect import load
+from xcrack import load
 
 # Small meshes: the two domains of K differ by a few per cent, advances are about a cell.
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

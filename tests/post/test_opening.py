@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import ProblemError
+from xcrack import ProblemError
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "meshes"
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")

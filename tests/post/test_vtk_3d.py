@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth.step import Step
+from xcrack import History, Step
 from xcrack.output.lip_faces_3d import lip_faces
 from xcrack.output.pieces import piece_cells, pieces
-from xcrack.runs.history import History
 from xcrack.runs.table import polylines
 
 N = 6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.base.errors import ProblemError
+from xcrack import ProblemError
 from xcrack.model.loads import FacetPoints
 
 ROUND_OFF = 1e-9

@@ -15,8 +15,8 @@ from support.front_fields import (
     ruled_lips,
     tube,
 )
+from xcrack import Isotropic
 from xcrack.crack.front_curve import FrontCurve, front_curve
-from xcrack.model.material import Isotropic
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.interaction_3d import (
     domain_integrals,

@@ -8,7 +8,7 @@ import scipy.optimize
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xcrack.base.errors import ConvergenceError
+from xcrack import ConvergenceError
 from xcrack.linalg.active_set import active_set
 
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 import xcrack as xc
 import xcrack.linalg.products as row_blocks_file
-from xcrack.base.errors import ConvergenceError
+from xcrack import ConvergenceError
 from xcrack.base.machine import threads
 from xcrack.linalg import products
 from xcrack.linalg.iterative import best_guesses, independent_columns

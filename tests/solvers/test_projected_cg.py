@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import xcrack as xc
 from support import scenes_2d as scenes
+from xcrack import ConvergenceError
 from xcrack.analysis.multipliers import gap_rows, multipliers
 from xcrack.analysis.solve import build
-from xcrack.base.errors import ConvergenceError
 from xcrack.fem.loads import load_vector
 from xcrack.linalg.active_set import active_set
 from xcrack.linalg.direct import system

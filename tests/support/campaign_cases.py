@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import xcrack as xc
-from xcrack.base.errors import ProblemError
+from xcrack import ProblemError
 
 
 def formula(a, load=1.0):

@@ -19,7 +19,8 @@ from scipy.spatial import cKDTree
 
 import xcrack as xc
 from support.meeting_energy import unbalanced
-from xcrack.base.errors import CoarseMeshError, GeometryError
+from xcrack import GeometryError
+from xcrack.base.errors import CoarseMeshError
 from xcrack.mesh.locate import Body
 
 E, NU, PULL = 1e5, 0.3, 100.0

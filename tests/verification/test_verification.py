@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from xcrack.base.errors import ProblemError
+from xcrack import ProblemError
 from xcrack.verification.exact import (
     arcs,
     closed,
