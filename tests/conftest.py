@@ -10,10 +10,15 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+PIXEL = bytes.fromhex(  # a white PNG
+    "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c494441"
+    "54789c63f8ffff3f0005fe02fe0def46b80000000049454e44ae426082"
+)
 
 
 def _kernels_key() -> str:
@@ -95,3 +100,24 @@ def _no_figure_left_open() -> Iterator[None]:
     pyplot = sys.modules.get("matplotlib.pyplot")
     if pyplot is not None:
         pyplot.close("all")
+
+
+@pytest.fixture
+def blank_pictures(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> None:
+    """PNG files of matplotlib have one pixel, but for tests marked as `drawn`.
+
+    Figures are made as ever. To draw one takes half a second, and tests/plotting does that.
+    """
+    if request.node.get_closest_marker("drawn"):
+        return
+    from matplotlib.figure import Figure
+
+    save = Figure.savefig
+
+    def save_pixel(figure: Figure, file: Any, **options: Any) -> None:
+        if options.get("format") != "png" or not hasattr(file, "write"):
+            save(figure, file, **options)
+        else:
+            file.write(PIXEL)
+
+    monkeypatch.setattr(Figure, "savefig", save_pixel)

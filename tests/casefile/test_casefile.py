@@ -13,7 +13,10 @@ from xcrack.app.main import main
 from xcrack.app.sweep import values_of
 from xcrack.base.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
 
-pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning"),
+    pytest.mark.usefixtures("blank_pictures"),
+]
 
 PLATE = """\
 title = "Edge crack"                      # a comment
@@ -366,6 +369,7 @@ def test_keys_can_be_changed(tmp_path):
             xc.read_case(file, changes)
 
 
+@pytest.mark.drawn
 def test_sweep_is_one_table_and_one_picture(tmp_path, capsys):
     """Lives of a sweep are those of runs one by one; failures are rows; it goes on where it was."""
     file = tmp_path / "case.toml"

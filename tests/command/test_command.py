@@ -9,7 +9,10 @@ import pytest
 import xcrack as xc
 from xcrack.app.main import main
 
-pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning"),
+    pytest.mark.usefixtures("blank_pictures"),
+]
 
 
 @pytest.fixture(autouse=True)
@@ -101,6 +104,7 @@ def test_life_of_a_stored_run(tmp_path, capsys):
     assert "holds no run" in capsys.readouterr().err
 
 
+@pytest.mark.drawn
 @pytest.mark.slow
 @pytest.mark.mission
 def test_run_report_and_chart(tmp_path, capsys):

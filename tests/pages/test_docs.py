@@ -42,6 +42,7 @@ def run(codes, folder):
         os.chdir(before)
 
 
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 @pytest.mark.parametrize("page", pages(needs_gmsh=False))
 def test_blocks_run(page, tmp_path):
@@ -49,6 +50,7 @@ def test_blocks_run(page, tmp_path):
 
 
 @pytest.mark.gmsh
+@pytest.mark.usefixtures("blank_pictures")
 @pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 @pytest.mark.parametrize("page", pages(needs_gmsh=True))
 def test_blocks_with_gmsh_run(page, tmp_path):

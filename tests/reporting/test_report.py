@@ -20,7 +20,10 @@ from xcrack.view import report as reporting
 from xcrack.view.view_3d import packed_layers
 
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
-pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning"),
+    pytest.mark.usefixtures("blank_pictures"),
+]
 
 
 @pytest.fixture(autouse=True)
@@ -95,6 +98,7 @@ def read(path):
     return text, reader, numbers
 
 
+@pytest.mark.drawn
 def test_report_of_a_solution(tmp_path):
     solutions = xc.solve(plate(), [1.0, -1.0])
     path = xc.report(solutions, tmp_path / "new" / "plate", title="A <plate>", yield_stress=300.0)
@@ -276,6 +280,7 @@ CHROMIUM = next(
 )
 
 
+@pytest.mark.drawn
 @pytest.mark.slow
 @pytest.mark.plot
 @pytest.mark.skipif(not CHROMIUM, reason="browser not available: no chromium")
@@ -485,6 +490,7 @@ def test_load_history_is_drawn(tmp_path):
         xc.plot_spectrum(xc.Spectrum(states=[0.0, 1.0], sequence=[0, 1]), file=tmp_path / "b.png")
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize("make", [plate, block])
 def test_set_up_before_a_solve(make, tmp_path):
     """Loads, supports, cracks and their normals by name; nothing is solved."""
