@@ -22,26 +22,51 @@ from xcrack.mesh.mesh import Mesh
 
 # Cracks put into a mesh: what of them is tip or front, what is mouth, and whether they meet.
 
+CutEnds = tuple[Sequence[Floats], Sequence[Floats]]
 
-_PLACE: dict[int, Callable[[Crack, Mesh], Crack]] = {2: place_line, 3: place_surface}
-_CHECK: dict[int, Callable[[tuple[Crack, ...], Mesh], None]] = {2: check_lines, 3: check_surfaces}
 
-_ON_OTHERS: dict[int, Callable[..., tuple[Crack, ...]]] = {
-    2: junctions_2d.on_others,
-    3: arms_placed,
-}
-_JUNCTIONS: dict[int, Callable[..., tuple[Junction, ...]]] = {
-    2: junctions_2d.junctions,
-    3: surface_junctions,
-}
-_ON_MESH: dict[int, Callable[[Crack, Mesh], Crack]] = {
-    2: vertices_on_mesh,
-    3: lambda crack, mesh: crack,
-}
-_SHORT: dict[int, Callable[[Crack, Mesh], list[ShortFront]]] = {
-    2: lambda crack, mesh: [],
-    3: surface_short_fronts,
-}
+@dataclass(frozen=True)
+class _Geometry:
+    """What lines in a plane body and surfaces in space do in ways of their own."""
+
+    place: Callable[[Crack, Mesh], Crack]
+    check: Callable[[tuple[Crack, ...], Mesh], None]
+    on_others: Callable[..., tuple[Crack, ...]]
+    junctions: Callable[..., tuple[Junction, ...]]
+    on_mesh: Callable[[Crack, Mesh], Crack]
+    short_fronts: Callable[[Crack, Mesh], list[ShortFront]]
+    end_frames: Callable[[Crack], CutEnds]
+
+
+def _tips(crack: Crack) -> CutEnds:
+    x, frame = tip_frames(crack)
+    return list(x), list(frame)
+
+
+def _fronts(crack: Crack) -> CutEnds:
+    fronts = front_frames(crack)
+    return [front.x for front in fronts], [front.frame for front in fronts]
+
+
+_LINES = _Geometry(
+    place_line,
+    check_lines,
+    junctions_2d.on_others,
+    junctions_2d.junctions,
+    on_mesh=vertices_on_mesh,
+    short_fronts=lambda crack, mesh: [],
+    end_frames=_tips,
+)
+_SURFACES = _Geometry(
+    place_surface,
+    check_surfaces,
+    arms_placed,
+    surface_junctions,
+    on_mesh=lambda crack, mesh: crack,
+    short_fronts=surface_short_fronts,
+    end_frames=_fronts,
+)
+_GEOMETRY = {2: _LINES, 3: _SURFACES}
 
 
 def place_crack(crack: Crack, mesh: Mesh) -> Crack:
@@ -65,7 +90,7 @@ def place_crack(crack: Crack, mesh: Mesh) -> Crack:
     """
     if crack.dim != mesh.dim:
         raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
-    return _PLACE[mesh.dim](crack, mesh)
+    return _GEOMETRY[mesh.dim].place(crack, mesh)
 
 
 def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
@@ -80,7 +105,7 @@ def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
     -------
     list of ShortFront
     """
-    return _SHORT[mesh.dim](crack, mesh)
+    return _GEOMETRY[mesh.dim].short_fronts(crack, mesh)
 
 
 def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
@@ -97,22 +122,22 @@ def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     GeometryError
         The message names the cracks and the place.
     """
-    _CHECK[mesh.dim](cracks, mesh)
+    _GEOMETRY[mesh.dim].check(cracks, mesh)
 
 
 def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
     """Placed cracks that end on others; see `on_others` in 2D and `arms_placed` in 3D."""
-    return _ON_OTHERS[mesh.dim](given, cracks, mesh)
+    return _GEOMETRY[mesh.dim].on_others(given, cracks, mesh)
 
 
 def on_mesh(crack: Crack, mesh: Mesh) -> Crack:
     """A placed crack as the mesh is cut by it; see `placing_2d.vertices_on_mesh`."""
-    return _ON_MESH[mesh.dim](crack, mesh)
+    return _GEOMETRY[mesh.dim].on_mesh(crack, mesh)
 
 
 def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
     """Where placed cracks end on others; see `junctions_2d.junctions`."""
-    return _JUNCTIONS[mesh.dim](cracks, mesh)
+    return _GEOMETRY[mesh.dim].junctions(cracks, mesh)
 
 
 _ON = 1e-6  # of a side of a front, by which its end may miss the boundary
@@ -206,22 +231,6 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
     )
 
 
-CutEnds = tuple[Sequence[Floats], Sequence[Floats]]
-
-
-def _tips(crack: Crack) -> CutEnds:
-    x, frame = tip_frames(crack)
-    return list(x), list(frame)
-
-
-def _fronts(crack: Crack) -> CutEnds:
-    fronts = front_frames(crack)
-    return [front.x for front in fronts], [front.frame for front in fronts]
-
-
-_ENDS: dict[int, Callable[[Crack], CutEnds]] = {2: _tips, 3: _fronts}
-
-
 def end_frames(crack: Crack) -> CutEnds:
     """Points and frames of each tip, in 3D of each front, of a placed crack.
 
@@ -235,7 +244,7 @@ def end_frames(crack: Crack) -> CutEnds:
     frames : sequence of (2, 2) or (m, 3, 3) arrays
         Rows (ahead, normal), in 3D (ahead, normal, along).
     """
-    return _ENDS[crack.dim](crack)
+    return _GEOMETRY[crack.dim].end_frames(crack)
 
 
 __all__ = [

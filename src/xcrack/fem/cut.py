@@ -5,8 +5,10 @@ from cell to cell. Sub-cell fractions are products of positive cut positions (no
 tiny pieces keep their relative accuracy.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -389,7 +391,9 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         bary, fraction, side, parent = cut_simplices(values[cells], corners)
         subs = [(cells[parent], bary, fraction, side)]
         lips = [_inner_lips(candidates[owner[through[owner]]], lip[through[owner]])]
-    for end_subs, end_lips, entry in _END_PARTS[mesh.dim](mesh, level_set, positions, exists):
+    for end_subs, end_lips, entry in _GEOMETRY[mesh.dim].end_parts(
+        mesh, level_set, positions, exists
+    ):
         subs.append(end_subs)
         lips.append(_inner_lips(*end_lips))
         edge_flag[entry] = True
@@ -467,7 +471,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
     if not len(facets):
         return empty
     cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
-    x, row = _UP_TO_ENDS[d](mesh, level_set, facets, cells, psi)
+    x, row = _GEOMETRY[d].lips_up_to_ends(mesh, level_set, facets, cells, psi)
     cells = cells[row]
     bary = np.stack(
         [
@@ -485,7 +489,7 @@ def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
     nodes = mesh.points[mesh.cells[cell[:, 1]]]
     corners = np.einsum("lvb,lbd->lvd", bary[:, 1], nodes - nodes[:, :1])
     slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
-    normal = _ACROSS[mesh.dim](corners)
+    normal = _GEOMETRY[mesh.dim].across(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.maximum(length, 1e-300)
     return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])
@@ -500,8 +504,16 @@ def _across_triangles(corners: Floats) -> Floats:
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
-# What differs with the dimension: the cells at tips and fronts, where lips on facets of the mesh
-# end, and a vector across a lip.
-_END_PARTS = {2: tip_parts, 3: front_parts}
-_UP_TO_ENDS = {2: lips_up_to_tips, 3: lips_up_to_fronts}
-_ACROSS = {2: _across_segments, 3: _across_triangles}
+@dataclass(frozen=True)
+class _Geometry:
+    """Cells at tips or fronts, where lips on facets of the mesh end, a vector across a lip."""
+
+    end_parts: Callable[..., Any]
+    lips_up_to_ends: Callable[..., tuple[Floats, Ints]]
+    across: Callable[[Floats], Floats]
+
+
+_GEOMETRY = {
+    2: _Geometry(tip_parts, lips_up_to_tips, _across_segments),
+    3: _Geometry(front_parts, lips_up_to_fronts, _across_triangles),
+}

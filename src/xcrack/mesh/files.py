@@ -30,7 +30,7 @@ from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.msh import REST, msh_text
 from xcrack.mesh.nastran import read_nastran
 from xcrack.mesh.polygon import Arc
-from xcrack.mesh.raw import CELL_KIND, FACET_KIND, RawMesh, mesh_from_raw, sets_to_write
+from xcrack.mesh.raw import KINDS, RawMesh, mesh_from_raw, sets_to_write
 
 _SET = "set:"  # prefix of the 0/1 cell data that carry a set in formats without sets
 _WITH_CELL_DATA = {".vtu", ".vtk", ".xdmf", ".xmf"}
@@ -315,7 +315,7 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
     points = np.zeros((mesh.n_points, 3))
     points[:, : mesh.dim] = mesh.points
     facet_sets, cell_sets = sets_to_write(mesh)
-    blocks, data = [(CELL_KIND[mesh.dim], mesh.cells)], {}
+    blocks, data = [(KINDS[mesh.dim], mesh.cells)], {}
     if path.suffix.lower() in _WITH_CELL_DATA:
         if not np.array_equal(mesh.facet_sets["boundary"], mesh.boundary):
             facet_sets["boundary"] = mesh.facet_sets["boundary"]  # in an order of its own
@@ -323,7 +323,7 @@ def _meshio_write(path: Path, mesh: Mesh) -> None:
         owner = np.repeat(np.arange(len(sizes)), sizes)  # a facet of two sets comes twice: each set
         if len(owner):  # keeps its order, and with it the last bit of what is summed over it
             facets = np.concatenate(list(facet_sets.values()))
-            blocks.insert(0, (FACET_KIND[mesh.dim], facets))
+            blocks.insert(0, (KINDS[mesh.dim - 1], facets))
         place = {name: k for k, name in enumerate(facet_sets)}
         for name in dict.fromkeys([*facet_sets, *cell_sets]):
             on_facets = (owner == place.get(name, -1)).astype(np.int32)

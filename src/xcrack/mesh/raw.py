@@ -11,9 +11,7 @@ from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.curved_facets import raised_lattice, with_curves
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
-TOPOLOGICAL_DIM = {"vertex": 0, "line": 1, "triangle": 2, "tetra": 3}
-CELL_KIND = {2: "triangle", 3: "tetra"}
-FACET_KIND = {2: "line", 3: "triangle"}
+KINDS = ("vertex", "line", "triangle", "tetra")  # by their own dimension
 _PLANAR = 1e-9  # spread of z over the extent of the body below which a mesh is plane
 
 
@@ -85,7 +83,7 @@ def mesh_parts(
     """
     _check_kinds(raw.blocks, source)
     dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw.blocks) else 2
-    doubled = _stack((data for kind, data in raw.blocks if kind == CELL_KIND[dim]), dim + 1)
+    doubled = _stack((data for kind, data in raw.blocks if kind == KINDS[dim]), dim + 1)
     if not len(doubled):
         content = ", ".join(f"{len(data)} {kind}" for kind, data in raw.blocks) or "nothing"
         raise MeshError(
@@ -110,7 +108,7 @@ def mesh_parts(
     facet_sets = _facet_sets(raw, bare, new, source)
     cell_sets = {
         name: np.sort(_row_numbers(cells, new[members]))
-        for name, members in _grouped_rows(raw.sets, CELL_KIND[dim], dim + 1).items()
+        for name, members in _grouped_rows(raw.sets, KINDS[dim], dim + 1).items()
     }
     for name, members in raw.point_sets:
         if name not in facet_sets:
@@ -171,7 +169,7 @@ def sets_to_write(mesh: Mesh) -> tuple[dict[str, Ints], dict[str, Ints]]:
 
 def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, Ints]:
     facet_sets = {}
-    for name, members in _grouped_rows(raw.sets, FACET_KIND[bare.dim], bare.dim).items():
+    for name, members in _grouped_rows(raw.sets, KINDS[bare.dim - 1], bare.dim).items():
         exists = (members >= 0) & (members < len(new))
         facets = np.where(exists, new[np.where(exists, members, 0)], -1)
         is_facet = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
@@ -189,7 +187,7 @@ def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, I
 def _check_kinds(blocks: list[tuple[str, Ints]], source: str) -> None:
     counts: dict[str, int] = {}
     for kind, data in blocks:
-        if kind not in TOPOLOGICAL_DIM and len(data):
+        if kind not in KINDS and len(data):
             counts[kind] = counts.get(kind, 0) + len(data)
     if not counts:
         return
