@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.rows import mission
 from support.strips import STRESS, by_formula, strip
 
 C, M, R = 1e-12, 3.0, 0.1
@@ -67,6 +68,8 @@ def test_loads_that_fall_as_the_root_of_the_length_are_constant_K():
     np.testing.assert_allclose(cycles(same), exact, rtol=ROUND_OFF)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_loads_over_cycles_converge_to_the_exact_length():
     """K = S (1 + N/N0) √(π a), so that 2 (a0^-½ - a^-½) is an integral over N; discretisation."""
     N0, errors = 2e5, []
@@ -88,7 +91,7 @@ def test_a_spectrum_follows_the_crack_too():
 
 @pytest.mark.parametrize(
     "program",
-    [xc.K_gradient(300.0, -0.02, 6.0), xc.load_over_cycles([(0.0, 1.0), (3e5, 2.0)])],
+    [xc.K_gradient(300.0, -0.02, 6.0), *mission(xc.load_over_cycles([(0.0, 1.0), (3e5, 2.0)]))],
 )
 def test_a_run_that_is_resumed_is_the_whole_one(program, tmp_path):
     """To the last bit; and with other loads it is refused."""

@@ -326,6 +326,8 @@ def test_a_run_is_resumed_to_the_bit(tmp_path):
         resume(tmp_path / "part", *arguments[:3], other, **options)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @COARSE
 def test_a_front_in_3D():
     """A disc: each place has the growth of its own cycles, by hand from its own K."""

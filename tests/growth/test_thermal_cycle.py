@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.rows import mission
 
 pytestmark = pytest.mark.filterwarnings("ignore:K a")
 
@@ -36,7 +37,7 @@ def cycle():
     return xc.Cycle(states=states)
 
 
-@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("d", [2, *mission(3)])
 def test_states_have_the_K_of_their_own_solve(d):
     """And so of the same stress as a pressure on the faces, within the discretisation."""
     problem = strip(d, contact="off")

@@ -243,6 +243,8 @@ def test_resumed_to_the_last_bit(tmp_path, lost):
     assert len(stored.mesh.cells) == len(whole.steps[-1].solutions[0].problem.mesh.cells)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_bars_between_solves_are_foretold(tmp_path):
     """Best K is that of own bars within the bars; a run that was at its end goes on alike."""
     asked = []

@@ -46,7 +46,7 @@ def run(problem=None, law=LAW, cycle=CYCLE, n=12, da=3.0, **options):
     return History(tuple(steps), "max_steps")
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def history():
     response = formula(mode_I())
     return run(response=response)
@@ -207,7 +207,7 @@ def test_rerate_that_stops_or_breaks(history):
 # --- inspections ---------------------------------------------------------------------------------
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def curve():
     """1 to 20 mm in m and MPa √m, the worked example: 881 834 cycles."""
     response = formula(mode_I(factor=lambda a: np.sqrt(np.pi * a * 0.001)))
