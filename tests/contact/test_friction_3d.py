@@ -73,6 +73,8 @@ def test_stick_is_the_uncracked_body():
     assert solution.dissipated == 0
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_slip_of_a_penny():
     mu = 0.4
     problem, Q = pressed_penny(0.25, mu)

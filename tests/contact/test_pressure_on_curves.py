@@ -40,7 +40,9 @@ def error_on_an_arc(half, cells):
     return np.sqrt(w @ off**2 / w.sum()) / size, np.abs(off).max() / size
 
 
-@pytest.mark.parametrize("half", [pytest.param(45, marks=pytest.mark.slow), 100])
+@pytest.mark.slow
+@pytest.mark.mission
+@pytest.mark.parametrize("half", [45, 100])
 def test_pressure_of_an_arc(half):
     """Discretisation: .004 and .02; with the dense knots of straight faces it was .06 and .2."""
     mean, largest = error_on_an_arc(half, 24)
