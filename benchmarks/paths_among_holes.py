@@ -17,13 +17,11 @@ import numpy as np
 
 import xcrack as xc
 from xcrack.base.arrays import Floats
-from xcrack.fatigue.criteria import Criterion, kink_angle
-from xcrack.fatigue.kink import kinked_K
+from xcrack.fatigue.criteria import Criterion, kink_angle, kinked_K
 from xcrack.growth.response import Response, respond
 from xcrack.sif.sif import SIF
-from xcrack.verification.experiments.experiment import Experiment, read_experiment
+from xcrack.verification.experiments.experiment import ROOT_M, Experiment, read_experiment
 from xcrack.verification.experiments.outcome import distances, rms
-from xcrack.verification.experiments.trial import ROOT_M
 from xcrack.verification.experiments.wagner import specimen
 
 Row = dict[str, tuple[float, float]]

@@ -16,7 +16,7 @@ from matplotlib.image import imread
 from matplotlib.tri import Triangulation
 
 from xcrack.base.arrays import Floats
-from xcrack.view.pyvista_2d import BAR
+from xcrack.view.pyvista import BAR
 
 _NOMINAL = 100.0  # MPa, ends of the colours of the bar
 _RADIUS, _DEPTH = 10.0, 2.0  # of the bar and its notch, mm

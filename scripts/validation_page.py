@@ -16,8 +16,13 @@ from pathlib import Path
 from benchmarks.paths_among_holes import lines as lines_of_moves
 from xcrack.verification.experiments.experiment import read_experiment
 from xcrack.verification.experiments.outcome import Outcome
-from xcrack.verification.experiments.page import MEANING, bound_words, value_words
-from xcrack.verification.experiments.pictures import draw_picture, draw_ratios
+from xcrack.verification.experiments.page import (
+    MEANING,
+    bound_words,
+    draw_picture,
+    draw_ratios,
+    value_words,
+)
 from xcrack.verification.experiments.validate import TRIALS
 
 ROOT = Path(__file__).parents[1]

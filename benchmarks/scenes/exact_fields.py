@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.scenes.material import NU, E
 from xcrack.base.arrays import Floats
-from xcrack.verification.exact import closed, fields_2d, fields_3d, holes
+from xcrack.verification.exact import closed, fields_2d, fields_3d, plates
 from xcrack.verification.exact.potentials_2d import uniform_stress
 
 Field = Callable[[Floats], Floats]
@@ -122,7 +122,7 @@ def kirsch(angle: float) -> Field:
 
     def stress(x: Floats) -> Floats:
         across = angle + np.pi / 2
-        return _tensor(holes.kirsch(x[:, 0], x[:, 1], 1.0, E, NU, s=-1.0, alpha=across)[1])
+        return _tensor(plates.kirsch(x[:, 0], x[:, 1], 1.0, E, NU, s=-1.0, alpha=across)[1])
 
     return stress
 
@@ -139,7 +139,7 @@ def kirsch_pressure(r: Floats) -> Floats:
     -------
     (n,)
     """
-    return -holes.kirsch_hoop(r, 1.0, -1.0, np.pi / 2)
+    return -plates.kirsch_hoop(r, 1.0, -1.0, np.pi / 2)
 
 
 def penny(radius: float, tension: float, shear: float = 0.0) -> Field:

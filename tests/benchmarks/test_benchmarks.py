@@ -21,7 +21,7 @@ from benchmarks.suites import cases
 from support import scenes_2d as scenes
 from support import scenes_friction
 from xcrack.fem.williams import mode_matrix, tip_values, unit_gradients
-from xcrack.verification.exact import holes, plates
+from xcrack.verification.exact import plates
 
 ROOT = Path(__file__).resolve().parents[2]
 WITHIN = 1.2  # of the least time: two runs of one case on a busy machine differ by as much
@@ -92,7 +92,7 @@ def test_field_of_the_hole_is_that_of_the_package():
     x = rng.uniform(1, 3, 40)[:, None] * scenes.rows(0.0)[0] @ scenes.rows(0.7)
     x = np.concatenate([x, rng.uniform(1, 3, (40, 2))])
     wanted = scenes.turned(
-        lambda x, y: holes.kirsch(x, y, 1.0, 1.0, 0.3, s=-1.0, alpha=np.pi / 2), (0, 0), 0.7
+        lambda x, y: plates.kirsch(x, y, 1.0, 1.0, 0.3, s=-1.0, alpha=np.pi / 2), (0, 0), 0.7
     )
     assert exact_fields.kirsch(0.7)(x) == pytest.approx(wanted(x)[1], abs=1e-12)
     across = np.array([scenes.rows(0.7)[1]] * 40)

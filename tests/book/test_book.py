@@ -8,8 +8,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.verification.book import run as runner
-from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.requirements import REQUIREMENTS
+from xcrack.verification.book.case import REQUIREMENTS, Case, Value
 from xcrack.verification.book.run import Book, chosen, find_cases, run_case, run_cases
 
 CASES = find_cases()

@@ -16,7 +16,7 @@ import pytest
 import xcrack as xc
 from support.case_texts import STRIP, STRIP_GROWTH, STRIP_PULL
 from xcrack import Closure, GrowthLaw, Load, Material, Threshold
-from xcrack.app import case, case_assessment, case_histories, case_values
+from xcrack.app import case, case_histories, case_values
 from xcrack.app.case_tables import Source, Table
 from xcrack.base.arguments import arguments_of
 from xcrack.base.description import describe
@@ -239,7 +239,7 @@ def test_no_option_is_forgotten():
         (xc.inspection, {"pod"}),
         (xc.residual_strength, set()),
     ):
-        names = set(arguments_of(maker)) - set(case_assessment._OF_RUN)
+        names = set(arguments_of(maker)) - set(case_histories._OF_RUN)
         assert given <= names
     assert set(case_histories._CHOICES) | set(case_histories._FORMS) == set(
         arguments_of(xc.Spectrum)

@@ -72,7 +72,7 @@ progress = false
 
 @pytest.fixture(autouse=True)
 def _by_matplotlib(monkeypatch):
-    monkeypatch.setattr("xcrack.view.pyvista_2d.can_render", lambda: False)
+    monkeypatch.setattr("xcrack.view.pyvista.can_render", lambda: False)
 
 
 def written(folder, text, name="case.toml"):

@@ -17,7 +17,7 @@ pytestmark = [
 
 @pytest.fixture(autouse=True)
 def _by_matplotlib(monkeypatch):
-    monkeypatch.setattr("xcrack.view.pyvista_2d.can_render", lambda: False)
+    monkeypatch.setattr("xcrack.view.pyvista.can_render", lambda: False)
     monkeypatch.setattr("xcrack.app.info.can_render", lambda: False)
 
 

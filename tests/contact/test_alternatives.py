@@ -24,7 +24,7 @@ from xcrack.analysis.solve import build, solve_states
 from xcrack.linalg.direct import system
 from xcrack.linalg.rigid_motion import free_motion
 from xcrack.verification import methods
-from xcrack.verification.methods.face_stress import averaging, lip_shares, stress_matrix
+from xcrack.verification.methods.contact import averaging, lip_shares, stress_matrix
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 

@@ -9,7 +9,12 @@ import pytest
 
 import xcrack as xc
 from xcrack.verification.experiments import validate as runner
-from xcrack.verification.experiments.experiment import experiment_names, read_experiment
+from xcrack.verification.experiments.experiment import (
+    Trial,
+    by_others,
+    experiment_names,
+    read_experiment,
+)
 from xcrack.verification.experiments.outcome import (
     Comparison,
     Curve,
@@ -19,7 +24,6 @@ from xcrack.verification.experiments.outcome import (
     path_comparisons,
 )
 from xcrack.verification.experiments.page import bound_words, validation_page
-from xcrack.verification.experiments.trial import Trial, by_others
 
 TRIALS = {trial.name: trial for trial in runner.TRIALS}
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.fatigue.criteria import kink_angle
-from xcrack.fatigue.kink import kinked_K, limit_angles
+from xcrack.fatigue.criteria import kink_angle, kinked_K, limit_angles
 
 
 def test_pure_mode_II_turns_by_the_angle_of_local_symmetry():

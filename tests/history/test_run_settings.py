@@ -36,9 +36,9 @@ from xcrack import (
 )
 from xcrack.base import description
 from xcrack.base.description import describe, differences
+from xcrack.base.machine import versions
 from xcrack.growth.options import GrowthRule
 from xcrack.runs import collect as collecting
-from xcrack.runs.versions import versions
 
 
 def push(size):
@@ -294,7 +294,7 @@ def test_the_number_of_threads_is_recorded_and_reported(whole, monkeypatch):
 
 def test_threads_of_a_process_are_counted():
     """As OpenBLAS counts them, in a process that was given another number."""
-    code = "from xcrack.runs.versions import versions; print(versions()['BLAS threads'])"
+    code = "from xcrack.base.machine import versions; print(versions()['BLAS threads'])"
     for count in ("1", "2"):
         names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
         child = subprocess.run(

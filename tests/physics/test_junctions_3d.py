@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 import xcrack as xc
 from xcrack.fem.system import discretise
 from xcrack.output.lip_faces_3d import junction_lines, lip_faces
-from xcrack.view.matplotlib_3d import draw_cracks
-from xcrack.view.view_3d import solution_layers
+from xcrack.view.matplotlib import draw_cracks
+from xcrack.view.report_viewer import solution_layers
 
 DATA = Path(__file__).parents[1] / "data"
 STEEL = xc.Isotropic(1e5, 0.3)

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import xcrack as xc
-from xcrack.view import pyvista_2d as plot_pyvista
+from xcrack.view import pyvista as plot_pyvista
 from xcrack.view.scene_2d import FIELDS, scene
 
 

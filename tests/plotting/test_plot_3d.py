@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 import xcrack as xc
 from xcrack import History, Step, draw_fronts, draw_K
 from xcrack.crack.fronts import front_weights, is_closed
-from xcrack.view import pyvista_2d as plot_pyvista
+from xcrack.view import pyvista as plot_pyvista
 from xcrack.view.fronts_3d import step_fronts
 from xcrack.view.plot import crack_box
 from xcrack.view.projection import best_plane, given_plane, on_plane, section_outline

@@ -17,7 +17,7 @@ import pytest
 
 import xcrack as xc
 from xcrack.view import report as reporting
-from xcrack.view.view_3d import packed_layers
+from xcrack.view.report_viewer import packed_layers
 
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
 pytestmark = [
@@ -30,7 +30,7 @@ pytestmark = [
 def _by_matplotlib(monkeypatch, request):
     """No renderer where a test does not ask for one: quick, and the same everywhere."""
     if not request.node.get_closest_marker("plot"):
-        monkeypatch.setattr("xcrack.view.pyvista_2d.can_render", lambda: False)
+        monkeypatch.setattr("xcrack.view.pyvista.can_render", lambda: False)
 
 
 def plate():
@@ -228,7 +228,7 @@ def test_report_of_a_run_in_space(tmp_path):
 
 
 def test_too_much_is_left_out_and_named(monkeypatch, tmp_path):
-    monkeypatch.setattr("xcrack.view.view_3d.MOST", 10)
+    monkeypatch.setattr("xcrack.view.report_viewer.MOST", 10)
     text, _, numbers = read(xc.report(penny(), tmp_path / "large.html"))
     assert numbers["view"] == {"layers": 0}
     assert "too much for a page" in text

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from xcrack import ProblemError, Spectrum, rainflow
-from xcrack.fatigue.rainflow import turning_points
+from xcrack.fatigue.spectrum import turning_points
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4, -2]  # figure 6 of ASTM E1049-85
 

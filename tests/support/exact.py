@@ -26,12 +26,17 @@ from xcrack.verification.exact.fields_3d import crack_displacement as crack_disp
 from xcrack.verification.exact.fields_3d import ellipse_coeffs, ellipse_K, penny, penny_K
 from xcrack.verification.exact.fields_3d import ellipse_displacement as ellipse_disp
 from xcrack.verification.exact.fields_3d import uniform_stress_3d as uniform_stress3
-from xcrack.verification.exact.holes import kirsch, lame_cylinder
 from xcrack.verification.exact.kinks import equivalent_K as k_eq
 from xcrack.verification.exact.kinks import hoop_angle
 from xcrack.verification.exact.lives import elber_share as elber_U
 from xcrack.verification.exact.lives import paris_life
-from xcrack.verification.exact.plates import BOWIE, newman_raju_corner, newman_raju_surface
+from xcrack.verification.exact.plates import (
+    BOWIE,
+    kirsch,
+    lame_cylinder,
+    newman_raju_corner,
+    newman_raju_surface,
+)
 from xcrack.verification.exact.plates import PLATE_CENTRE as CCT_LS
 from xcrack.verification.exact.plates import PLATE_EDGE as SENT_LS
 from xcrack.verification.exact.potentials_2d import complex_points as _z

@@ -16,7 +16,6 @@ from xcrack.verification.exact import (
     closed,
     fields_2d,
     fields_3d,
-    holes,
     kinks,
     lives,
     plates,
@@ -36,8 +35,8 @@ FIELDS = {
     "closed": lambda x, y, plane: closed.closed_crack(x, y, A, E, NU, 0.1, -1.0, 0.6, 0.2, plane),
     "partial": lambda x, y, plane: closed.partial_closure(x, y, A, E, NU, 0.1, 1.0, 0.2, plane),
     "centre": lambda x, y, plane: closed.centre_open(x, y, A, E, NU, 1.0, 0.3, plane),
-    "kirsch": lambda x, y, plane: holes.kirsch(x, y, 0.3, E, NU, 1.0, 0.4, -0.2, plane),
-    "lame": lambda x, y, plane: holes.lame_cylinder(x, y, 0.3, 2.0, 1.0, 0.4, E, NU, plane),
+    "kirsch": lambda x, y, plane: plates.kirsch(x, y, 0.3, E, NU, 1.0, 0.4, -0.2, plane),
+    "lame": lambda x, y, plane: plates.lame_cylinder(x, y, 0.3, 2.0, 1.0, 0.4, E, NU, plane),
     "arc": lambda x, y, plane: arcs.ArcCrack(0.7, 0.8, E, NU, 1.0, 0.4, 0.3, plane).field(x, y),
     "smooth arc": lambda x, y, plane: arcs.arc_manufactured(x, y, 0.7, E, NU, plane=plane),
 }  # fmt: skip
@@ -186,11 +185,11 @@ def test_holes_are_loaded_as_stated():
         pairs = [s[:, 0] * n[:, 0] + s[:, 2] * n[:, 1], s[:, 2] * n[:, 0] + s[:, 1] * n[:, 1]]
         return np.array(pairs).T
 
-    s = holes.kirsch(*(0.3 * n).T, 0.3, E, NU, 1.0, 0.4)[1]
+    s = plates.kirsch(*(0.3 * n).T, 0.3, E, NU, 1.0, 0.4)[1]
     assert traction(s) == pytest.approx(0.0, abs=1e-12)
-    assert s[:, 0] + s[:, 1] == pytest.approx(holes.kirsch_hoop(0.3, 0.3, 1.0, theta - 0.4))
+    assert s[:, 0] + s[:, 1] == pytest.approx(plates.kirsch_hoop(0.3, 0.3, 1.0, theta - 0.4))
     for r, p in ((0.3, 1.0), (2.0, 0.4)):
-        s = holes.lame_cylinder(*(r * n).T, 0.3, 2.0, 1.0, 0.4, E, NU)[1]
+        s = plates.lame_cylinder(*(r * n).T, 0.3, 2.0, 1.0, 0.4, E, NU)[1]
         assert traction(s) == pytest.approx(-p * n, abs=1e-12)
 
 

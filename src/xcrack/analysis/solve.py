@@ -41,9 +41,8 @@ from xcrack.linalg.rigid_motion import (
     free_motion,
     without_motion,
 )
-from xcrack.model.friction import check_order
 from xcrack.model.loads import Load
-from xcrack.model.problem import LoadState, Problem, ProblemArgument
+from xcrack.model.problem import LoadState, Problem, ProblemArgument, check_order
 from xcrack.model.supports import Support
 
 # How much of an initial stress the body cannot bear: its part out of balance.

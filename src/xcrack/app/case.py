@@ -13,8 +13,15 @@ import numpy as np
 from xcrack.adaptivity.adapt import adapt
 from xcrack.analysis.solve import solve
 from xcrack.app import case_values as values
-from xcrack.app.case_assessment import inspection_of, life_of, retarded_of, strength_of
-from xcrack.app.case_histories import load_states, loading, retardation_of
+from xcrack.app.case_histories import (
+    inspection_of,
+    life_of,
+    load_states,
+    loading,
+    retardation_of,
+    retarded_of,
+    strength_of,
+)
 from xcrack.app.case_tables import Table, read_tables
 from xcrack.base.arguments import FileName, arguments_of, check_arguments
 from xcrack.base.arrays import Bools, Floats

@@ -42,8 +42,8 @@ from xcrack.crack.surfaces import (
 from xcrack.fatigue import criteria, fracture, power  # noqa: F401 - laws are found as classes
 from xcrack.fatigue.fracture import nasgro_K_c
 from xcrack.fatigue.law import GrowthLaw
+from xcrack.fatigue.metals import law as preset
 from xcrack.fatigue.metals import material as metal
-from xcrack.fatigue.presets import law as preset
 from xcrack.fatigue.tables import rate_table
 from xcrack.fatigue.time import with_time
 from xcrack.mesh.box import box

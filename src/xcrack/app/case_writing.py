@@ -28,8 +28,7 @@ from xcrack.base.paths import system_errors, written_whole
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
-from xcrack.fatigue.law import GrowthLaw, Law
-from xcrack.fatigue.law_sets import LawSets
+from xcrack.fatigue.law import GrowthLaw, Law, LawSets
 from xcrack.fatigue.retardation import RetardationSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options

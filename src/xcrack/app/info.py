@@ -1,4 +1,4 @@
-"""What this installation is made of, what is missing, and where kernels are kept."""
+"""What this installation is made of and what is missing; meshes from one file to another."""
 
 import os
 import platform
@@ -12,21 +12,21 @@ import numpy as np
 
 import xcrack
 from xcrack.analysis.solve import solve
-from xcrack.base.arguments import Switch, check_arguments
-from xcrack.base.errors import XcrackError, XcrackWarning
-from xcrack.base.machine import number_of_threads
+from xcrack.base.arguments import FileName, Switch, check_arguments
+from xcrack.base.errors import MeshError, XcrackError, XcrackWarning
+from xcrack.base.machine import number_of_threads, versions
 from xcrack.base.optional import require_package
 from xcrack.crack.crack import Crack
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import penny_crack
 from xcrack.mesh.box import box
+from xcrack.mesh.files import read_mesh, write_mesh
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import displacement
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.runs.versions import versions
 from xcrack.sif.stress_intensity import stress_intensity
-from xcrack.view.pyvista_2d import can_render
+from xcrack.view.pyvista import can_render
 
 _NEEDED = ("numpy", "scipy", "numba", "meshio", "gmsh", "pyvista", "matplotlib", "pyamg",
            "threadpoolctl")  # fmt: skip
@@ -155,4 +155,30 @@ def _last_entry(x: np.ndarray) -> np.ndarray:
     return np.eye(x.shape[1])[-1]
 
 
-__all__ = ["Info", "info"]
+# --- meshes from one file to another ---
+
+
+@check_arguments(MeshError)
+def convert_mesh(source: FileName, target: FileName) -> Mesh:
+    """Read a mesh from a file and write it to another one, of another kind if need be.
+
+    Parameters
+    ----------
+    source, target : path
+        Files that `read_mesh` reads and `write_mesh` writes; their endings say the kind.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        A file that cannot be read or written, or a mesh that is not sound.
+    """
+    mesh = read_mesh(source)
+    write_mesh(target, mesh)
+    return mesh
+
+
+__all__ = ["Info", "convert_mesh", "info"]

@@ -20,7 +20,7 @@ from xcrack.base.paths import system_errors, written_whole
 from xcrack.runs.campaign import Study, campaign, grid, key_of
 from xcrack.runs.run_folder import STEPS
 from xcrack.sif.stress_intensity import stress_intensities
-from xcrack.view.sweeps import draw_sweep
+from xcrack.view.lives import draw_sweep
 
 TABLE, PICTURE = "sweep.csv", "sweep.png"
 _MODES = ("K_I", "K_II", "K_III")

@@ -9,8 +9,7 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import call_function, numbers, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fatigue.criteria import Criterion
-from xcrack.fatigue.law import NEEDS, Law, largest_K
-from xcrack.fatigue.law_sets import LawSets, Names
+from xcrack.fatigue.law import NEEDS, Law, LawSets, Names, largest_K
 
 _NEAR = 1e-3  # change of ln(range) over which the slope of a law is taken
 _USUAL, _EXPONENTS = 3.0, (1.0, 20.0)

@@ -1,15 +1,15 @@
 """A growth law: rate, closure, threshold and toughness; its arguments, its R, its units."""
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from xcrack.base.arguments import Choice, Declared, Rule, arguments_of
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import number, numbers, value_text
+from xcrack.base.checks import check_set_names, number, numbers, value_text, values_by_set
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import NUMBER, Dimension
 from xcrack.fatigue.units import factors
@@ -353,6 +353,65 @@ def largest_K(dK: Floats, R: Floats) -> Floats:
         return np.asarray(np.where(dK > 0, dK / share, 0.0))
 
 
+# --- laws of growth by the materials that tips are in ---
+
+
+Names = NDArray[np.str_]
+
+
+@dataclass(frozen=True)
+class LawSets:
+    """Laws by the names of the cell sets that materials have; each tip grows by that of its own.
+
+    ``grow(problem, {"plate": ..., "weld": ...}, ...)`` is short for it.
+
+    Parameters
+    ----------
+    laws : mapping of str to callable
+
+    Raises
+    ------
+    ProblemError
+        No mapping of names to laws, or laws whose R is not meant alike.
+    """
+
+    laws: Any
+
+    def __post_init__(self) -> None:
+        pairs = values_by_set(
+            self.laws, "law", "laws", "paris", "a law such as paris(...)",
+            lambda law: callable(law) and not isinstance(law, LawSets),
+        )  # fmt: skip
+        object.__setattr__(self, "laws", pairs)
+        ratios = {getattr(law, "ratio", None) for _, law in self.laws}
+        if len(ratios) > 1:
+            raise ProblemError(
+                f"law: R is meant in several ways, ratio = {', '.join(sorted(map(str, ratios)))}: "
+                "give all laws of a run the same."
+            )
+
+    @property
+    def ratio(self) -> str | None:
+        """Which R the constants belong to: the same for all."""
+        return getattr(self.laws[0][1], "ratio", None)
+
+    @property
+    def knows_negative_ratios(self) -> bool:
+        """Whether the answer of one of them for R < 0 depends on how R is meant."""
+        return any(getattr(law, "knows_negative_ratios", False) for _, law in self.laws)
+
+    def check(self, names: Sequence[str]) -> None:
+        """Raise where the materials of a problem are others.
+
+        Raises
+        ------
+        ProblemError
+            A material without a law, or a law without a material.
+        """
+        given = [name for name, _ in self.laws]
+        check_set_names(given, names, "law", "laws", "a law")
+
+
 __all__ = [
     "NEEDS",
     "Approach",
@@ -361,6 +420,8 @@ __all__ = [
     "Constants",
     "GrowthLaw",
     "Law",
+    "LawSets",
+    "Names",
     "RRange",
     "Ratio",
     "Threshold",

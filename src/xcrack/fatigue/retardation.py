@@ -13,8 +13,7 @@ from xcrack.base.checks import check_set_names, numbers, values_by_set
 from xcrack.base.errors import ProblemError
 from xcrack.base.units import STRESS, TOUGHNESS
 from xcrack.fatigue.checks import evaluate_law
-from xcrack.fatigue.law import Constants, Law, largest_K
-from xcrack.fatigue.law_sets import LawSets, Names
+from xcrack.fatigue.law import Constants, Law, LawSets, Names, largest_K
 
 _LARGEST = 1e120  # K whose square is a number
 

@@ -14,7 +14,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, coordinates
 from xcrack.base.description import describe
 from xcrack.base.errors import ProblemError, collected_warnings, warn
 from xcrack.fatigue.cycle import cycles_between
-from xcrack.fatigue.law_sets import LawSets
+from xcrack.fatigue.law import LawSets
 from xcrack.fatigue.retardation import BlockCycles, OverloadZones, RetardationSets
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import rates_by_law_of

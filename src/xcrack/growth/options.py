@@ -16,11 +16,10 @@ from xcrack.base.errors import ProblemError, warn
 from xcrack.base.units import LENGTH, TOUGHNESS
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
-from xcrack.fatigue.law_sets import LawSets
+from xcrack.fatigue.law import LawSets
 from xcrack.fatigue.load_program import LoadProgram
-from xcrack.fatigue.rainflow import turning_points
 from xcrack.fatigue.retardation import Retardation, RetardationSets, willenborg
-from xcrack.fatigue.spectrum import Spectrum
+from xcrack.fatigue.spectrum import Spectrum, turning_points
 from xcrack.growth.response import Respond
 from xcrack.growth.stations import CellSizes
 from xcrack.model.problem import LoadLevel, Problem

@@ -13,11 +13,9 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.stations import Stations
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law, law_exponent
 from xcrack.fatigue.criteria import clipped_K, kink_angle, local_equivalent_K, nominal_range
-from xcrack.fatigue.law import Law
-from xcrack.fatigue.law_sets import LawSets, Names
-from xcrack.fatigue.rainflow import closed_cycles
+from xcrack.fatigue.law import Law, LawSets, Names
 from xcrack.fatigue.retardation import BlockCycles, RetardationSets
-from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
+from xcrack.fatigue.spectrum import Spectrum, closed_cycles, distinct_cycles
 from xcrack.growth.levels import has_slip, ladders, respond_to_states
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.response import Answers, Response

@@ -14,8 +14,7 @@ from xcrack.crack.meetings import LEAST
 from xcrack.fatigue.checks import depends_on_ratio
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
-from xcrack.fatigue.law import Law
-from xcrack.fatigue.law_sets import LawSets
+from xcrack.fatigue.law import Law, LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_life, alarms_of_step, validity_of

@@ -26,8 +26,7 @@ from xcrack.crack.meetings import (
     with_tips_at,
 )
 from xcrack.crack.placing_2d import MOUTH
-from xcrack.fatigue.criteria import clipped_K
-from xcrack.fatigue.kink import START, kinked_K, limit_angles
+from xcrack.fatigue.criteria import START, clipped_K, kinked_K, limit_angles
 from xcrack.fatigue.retardation import BlockCycles, no_zones
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.corrected import Corrected

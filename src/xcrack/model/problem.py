@@ -1,6 +1,7 @@
 """The scene: body, cracks, supports and loads, checked before anything is built."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Set as AnySet
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -23,8 +24,8 @@ from xcrack.base.arguments import (
     Whole,
     check_arguments,
 )
-from xcrack.base.checks import value_text
-from xcrack.base.errors import CoarseMeshError, ProblemError
+from xcrack.base.checks import entries, number, value_text
+from xcrack.base.errors import CoarseMeshError, ProblemError, XcrackError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
@@ -39,12 +40,119 @@ from xcrack.crack.stations import (
 )
 from xcrack.mesh.mesh import Mesh, warn_of_sets
 from xcrack.model.elasticity import Elasticity, elasticity
-from xcrack.model.friction import fitted_friction, friction_coefficients
 from xcrack.model.loads import Load
 from xcrack.model.material import Material, MaterialSets
 from xcrack.model.numerics import Numerics
-from xcrack.model.reference import ReferenceK
 from xcrack.model.supports import Support
+
+
+class ReferenceK(Declared):
+    """K of a crack that is known from elsewhere; among them the handbook of `xcrack.sif.handbook`.
+
+    Attributes
+    ----------
+    crack : int
+        Number of the crack in the problem.
+    """
+
+    crack: Annotated[int, Whole(least=0)]
+
+    def check(self, problem: Any) -> None:
+        """Raise where the problem has no such crack.
+
+        Raises
+        ------
+        ProblemError
+        """
+        if self.crack >= len(problem.cracks):
+            raise ProblemError(
+                f"handbook: crack = {self.crack}: the problem has {len(problem.cracks)} crack(s), "
+                "numbered from 0: give the number of one of them."
+            )
+
+    def comparison(self, solution: Any) -> str:
+        """K of a solution beside this one, in words."""
+        raise NotImplementedError
+
+
+# --- checks of friction where it is given: coefficients, and load states whose order counts ---
+
+
+_MOST = 1e3  # beyond, faces that press never slip
+
+
+def friction_coefficients(
+    value: Any, what: str, error: type[XcrackError]
+) -> float | tuple[float, ...]:
+    """Coefficients of friction, checked: one for all cracks, or one for each."""
+    if isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        return number(value, what, least=0, most=_MOST, error=error)
+    wrong = f"{what} = {value_text(value)}: give a number, or a list of one a crack."
+    if isinstance(value, AnySet):
+        raise error(wrong)
+    try:
+        given = entries(value, what, error=error)
+    except error:
+        raise error(wrong) from None
+    return tuple(
+        number(mu, f"{what}[{c}]", least=0, most=_MOST, error=error) for c, mu in enumerate(given)
+    )
+
+
+def fitted_friction(
+    friction: float | Sequence[float], n_cracks: int, dim: int, numerics: Numerics
+) -> float | tuple[float, ...]:
+    """Coefficients of the cracks of a problem.
+
+    Parameters
+    ----------
+    friction : float, or sequence of one a crack
+    n_cracks : int
+    dim : int
+    numerics : Numerics
+
+    Raises
+    ------
+    ProblemError
+        Another count than cracks, or a method without friction.
+    """
+    if isinstance(friction, Sequence):
+        if len(friction) != n_cracks:
+            raise ProblemError(
+                f"Problem: friction = {value_text(list(friction))}: the problem has {n_cracks} "
+                f"crack(s); give a number for all of them, or a list of one a crack."
+            )
+        if len(set(friction)) == 1:  # cracks that join in growth then need no numbers of their own
+            friction = friction[0]
+    if friction if isinstance(friction, float) else any(friction):
+        _check_method(dim, numerics)
+    return friction if isinstance(friction, float) else tuple(friction)
+
+
+def _check_method(dim: int, numerics: Numerics) -> None:
+    method = numerics.contact_method
+    if method is not None and dim not in method.friction_dims:
+        raise ProblemError(
+            f"friction in {dim}D with {method.label}: multipliers carry it; leave contact_method "
+            "out, or give friction=0."
+        )
+
+
+def check_order(frictions: Sequence[float], states: Any) -> None:
+    """Raise where states without an order are given to a problem with friction.
+
+    Parameters
+    ----------
+    frictions : sequence of float
+        Of each crack.
+    states : anything
+    """
+    if any(frictions) and isinstance(states, AnySet | Mapping):
+        raise ProblemError(
+            f"states = {value_text(states)} with friction: each state is reached from the one "
+            f"before it, and a set or dict has no order: give a list."
+        )
+
 
 _FACTOR = Number(hint="a list of loads will do too")
 
@@ -337,4 +445,12 @@ def crack_number(problem: Problem, crack: int, what: str) -> int:
     return crack
 
 
-__all__ = ["LoadLevel", "LoadState", "scaled_state"]
+__all__ = [
+    "LoadLevel",
+    "LoadState",
+    "ReferenceK",
+    "check_order",
+    "fitted_friction",
+    "friction_coefficients",
+    "scaled_state",
+]

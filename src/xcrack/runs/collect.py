@@ -9,6 +9,7 @@ from typing import Any, Unpack
 from xcrack.base.checks import call_function, flag, value_text
 from xcrack.base.description import differences, only_compiled_differently
 from xcrack.base.errors import ProblemError, warn
+from xcrack.base.machine import versions
 from xcrack.base.paths import path_of, system_errors
 from xcrack.crack.measures import measures
 from xcrack.fatigue.criteria import Criterion
@@ -25,7 +26,6 @@ from xcrack.runs.history import History
 from xcrack.runs.lock import lock_folder
 from xcrack.runs.run_folder import RunHeader, RunStore
 from xcrack.runs.saved import read_saved
-from xcrack.runs.versions import versions
 
 Until = Callable[[Step], bool] | str | Sequence[str]  # a function, or names of facet sets
 

@@ -6,18 +6,19 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xcrack.base import markup
-from xcrack.base.arguments import FileName, check_arguments
+from xcrack.base.arguments import FileName, Number, check_arguments
 from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.markup import element, join_parts, rim, sketch
 from xcrack.base.optional import require_package
 from xcrack.base.paths import path_of, system_errors, write_texts
+from xcrack.base.units import TOUGHNESS
 from xcrack.crack.crack import Crack
 from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.law import Law
@@ -25,16 +26,20 @@ from xcrack.fatigue.load_program import Curve, LoadProgram
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.step import Arrival, Join, Step
 from xcrack.mesh.mesh import Mesh
-from xcrack.runs.fracture_loads import fracture_loads
 from xcrack.runs.life_bar import LifeBar, life_bar
-from xcrack.runs.measures import measures_of_steps, measures_tables, with_measures
 from xcrack.runs.rerating import (
     RecomputedRates,
     block_of_run,
     load_program_of,
     recompute_rates,
 )
-from xcrack.runs.table import table
+from xcrack.runs.table import (
+    fracture_loads,
+    measures_of_steps,
+    measures_tables,
+    table,
+    with_measures,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +278,8 @@ class History:
         program = load_program_of(load, K_max)
         return recompute_rates(self.steps, law, old, block, program)
 
-    def load_at(self, K_c: float) -> NDArray[Any]:
+    @check_arguments()
+    def load_at(self, K_c: Annotated[float, Number(above=0, unit=TOUGHNESS)]) -> NDArray[Any]:
         """Force and displacement at which the crack goes on at K = K_c, at each step.
 
         Of a crack that grows without cycles, slowly, as soon as K reaches the toughness: the curve

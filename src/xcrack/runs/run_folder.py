@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from xcrack.base.errors import ProblemError, XcrackError, warn
+from xcrack.base.machine import versions
 from xcrack.base.paths import system_errors
 from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
@@ -29,7 +30,6 @@ from xcrack.runs.step_arrays import (
     step_of,
 )
 from xcrack.runs.store import PART, write_whole
-from xcrack.runs.versions import versions
 
 HEADER = "run.json"
 STEPS = "steps"  # folder of the run in that of the results of a case file

@@ -1,4 +1,4 @@
-"""Numbers of a growth run as a table: a row for each tip, in 3D for each front, of each step."""
+"""A growth run as tables: its ends, what an engineer measures, loads at fracture."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -6,17 +6,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import ProblemError
 from xcrack.base.paths import write_texts
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import front_weights
+from xcrack.crack.measures import Measures, measures
 from xcrack.growth.step import (
     Step,
 )
 from xcrack.growth.uncertainty import uses_best
+from xcrack.mesh.mesh import Mesh
 from xcrack.runs.life_bar import life_bar
+from xcrack.runs.rerating import check_in_proportion, driving_forces
 
 Columns = dict[str, Callable[[Step, int], Floats]]  # of a step and a crack, at its stations
 
@@ -346,4 +351,157 @@ def _cells(name: str, cells: Sequence[tuple[int, Ints]]) -> str:
 """
 
 
-__all__ = ["Table", "crack_numbers", "end_id", "polylines", "state_names", "table", "write_series"]
+# --- tables of what an engineer reads off the cracks of a run, and of where their ends lie ---
+
+
+Indicators = list[tuple[Step, int, Measures]]  # of each crack of each step
+
+
+def measures_of_steps(steps: Sequence[Step], mesh: Mesh) -> Indicators:
+    """Measures of each crack of each step."""
+    return [
+        (step, c, measures(crack, mesh)) for step in steps for c, crack in enumerate(step.cracks)
+    ]
+
+
+def measures_tables(every: Indicators, mesh: Mesh) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Measures of each crack of each step, and the ends of their fronts.
+
+    Parameters
+    ----------
+    every : list of (Step, crack number, Measures)
+    mesh : Mesh
+        The body.
+
+    Returns
+    -------
+    measures : structured array
+        Columns step, N, crack, area, front_length, depth, and for each facet set that a crack ever
+        meets ``length_<set>`` and ``depth_<set>`` (nan in steps where it does not).
+    ends : structured array
+        Columns step, N, crack, front, x, y (, z), set.
+    """
+    names = _set_names(every)
+    columns = [("step", np.int64), ("N", float), ("crack", np.int64)]
+    columns += [(name, float) for name in ("area", "front_length", "depth")]
+    columns += [(f"{what}_{name}", float) for name in names for what in ("length", "depth")]
+    rows = [
+        (step.index, step.cycles, c, m.area, m.front_length, m.depth, *_by_set(m, names))
+        for step, c, m in every
+    ]
+    width = max((len(name) for name in mesh.facet_sets), default=1)
+    places = [(axis, float) for axis in "xyz"[: mesh.dim]]
+    kinds = [*columns[:3], ("front", np.int64), *places, ("set", f"U{width}")]
+    ends = [
+        (step.index, step.cycles, c, end.front, *end.x, end.name)
+        for step, c, m in every
+        for end in m.ends
+    ]
+    return np.array(rows, dtype=columns), np.array(ends, dtype=kinds)
+
+
+def with_measures(rows: NDArray[Any], every: Indicators, mesh: Mesh) -> NDArray[Any]:
+    """The table of steps with the measures of the crack of each row behind its columns.
+
+    Parameters
+    ----------
+    rows : structured array
+        What `history.table.table` gives.
+    every : list of (Step, crack number, Measures)
+    mesh : Mesh
+
+    Returns
+    -------
+    structured array
+        With columns area, depth, ``length_<set>`` and ``depth_<set>``, and for both ends of the
+        front of the row, in 2D the mouths of its crack, ``end_0_x`` and so on, and ``end_0_set``.
+    """
+    names, axes = _set_names(every), "xyz"[: mesh.dim]
+    width = max((len(name) for name in mesh.facet_sets), default=1)
+    columns: list[tuple[str, Any]] = [("area", float), ("depth", float)]
+    columns += [(f"{what}_{name}", float) for name in names for what in ("length", "depth")]
+    for k in range(2):
+        columns += [(f"end_{k}_{axis}", float) for axis in axes]
+        columns.append((f"end_{k}_set", f"U{width}"))
+    measures_of_step = {(step.index, c): m for step, c, m in every}
+    numbers = rows["front"] if "front" in (rows.dtype.names or ()) else np.full(len(rows), -1)
+    result = []
+    for row, front in zip(rows, numbers.tolist(), strict=True):
+        m = measures_of_step[int(row["step"]), int(row["crack"])]
+        values: list[Any] = [m.area, m.depth, *_by_set(m, names)]
+        ends_of_front = [end for end in m.ends if end.front == front][:2]
+        for k in range(2):
+            values += (
+                [*ends_of_front[k].x, ends_of_front[k].name]
+                if k < len(ends_of_front)
+                else [*[np.nan] * len(axes), ""]
+            )
+        result.append((*row.tolist(), *values))
+    return np.array(result, dtype=[*rows.dtype.descr, *columns])
+
+
+def _set_names(every: Indicators) -> list[str]:
+    return sorted({trace.name for _, _, m in every for trace in m.traces})
+
+
+def _by_set(m: Measures, names: Sequence[str]) -> list[float]:
+    traces = {trace.name: (trace.length, trace.depth) for trace in m.traces}
+    return [value for name in names for value in traces.get(name, (np.nan, np.nan))]
+
+
+# --- loads at which a crack goes on without cycles: K = K_c at each step of a run ---
+
+
+COLUMNS = ("step", "a", "factor", "force", "displacement")
+
+
+def fracture_loads(steps: Sequence[Step], K_c: float) -> NDArray[Any]:
+    """As `History.load_at`.
+
+    Raises
+    ------
+    ProblemError
+    """
+    solved = [step for step in steps if not step.has_left]
+    if not solved or not all(step.solutions for step in solved):
+        raise ProblemError(
+            "load_at: the steps have no solutions, as those of a run read from its folder: call it "
+            "on what collect returned."
+        )
+    check_in_proportion(solved, driving_forces(steps), "load_at")
+    rows = []
+    for step in solved:
+        pairs = zip(step.dK_eq, step.R, strict=True)
+        K = [float((dK / (1.0 - R)).max()) for dK, R in pairs if len(dK)]
+        factor = K_c / max(K)
+        solution = max(step.solutions, key=lambda each: each.energy)
+        force = _largest_resultant(solution)
+        size = _largest_size(step)
+        rows.append((step.index, size, factor, factor * force,
+                     factor * 2.0 * solution.energy / force))  # fmt: skip
+    kinds = [(name, int if name == "step" else float) for name in COLUMNS]
+    return np.array(rows, dtype=kinds)
+
+
+def _largest_resultant(solution: Solution) -> float:
+    """Norm of the largest force of a load or of a support."""
+    return max(float(np.linalg.norm(row.force)) for row in solution.report.resultants)
+
+
+def _largest_size(step: Step) -> float:
+    """Length of all cracks in the body, in 3D their area."""
+    mesh = step.solutions[0].problem.mesh
+    return sum(measures(crack, mesh).area for crack in step.cracks)
+
+
+__all__ = [
+    "COLUMNS",
+    "Table",
+    "crack_numbers",
+    "end_id",
+    "fracture_loads",
+    "polylines",
+    "state_names",
+    "table",
+    "write_series",
+]

@@ -17,7 +17,7 @@ from xcrack.base.arrays import Floats
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.base.units import FORCE, LENGTH, STRESS
-from xcrack.model.reference import ReferenceK
+from xcrack.model.problem import ReferenceK
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensity
 

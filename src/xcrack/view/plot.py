@@ -31,7 +31,7 @@ from xcrack.fem.system import discretise
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import CrackNumber, Problem, crack_number, scaled_state
 from xcrack.view.figures import Title, picture_path
-from xcrack.view.pyvista_2d import RASTER
+from xcrack.view.pyvista import RASTER
 from xcrack.view.scene_2d import FIELDS, SPACE_FIELDS, scene
 from xcrack.view.scene_3d import LIP_FIELDS, clip_plane
 from xcrack.view.section_3d import Plane
@@ -190,11 +190,11 @@ def _draw_2d(
     if look.plane is not None or look.view is not None or look.loads:
         raise ProblemError("plot(clip=, view=, loads=): only 3D bodies know these; leave them out.")
     if field in _GRAPHS:
-        from xcrack.view.matplotlib_2d import draw_along
+        from xcrack.view.matplotlib import draw_along
 
         return draw_along(solution, field, look.cracks(solution), target, window, look.title)
     if field == "mesh":
-        from xcrack.view.matplotlib_2d import draw_mesh
+        from xcrack.view.matplotlib import draw_mesh
 
         return draw_mesh(solution, target, window, look.title, look.near)
     if look.near is not None and renderer == "pyvista":
@@ -208,12 +208,12 @@ def _draw_2d(
         )
     picture = replace(scene(solution, field, look.warp, look.limits), focus_box=look.near)
     if renderer == "matplotlib" or fault:
-        from xcrack.view import matplotlib_2d as plot_matplotlib
+        from xcrack.view import matplotlib as plot_matplotlib
 
         return plot_matplotlib.draw(
             picture, target, window, look.title, look.edges, look.colours(picture.has_sign)
         )
-    from xcrack.view import pyvista_2d as plot_pyvista
+    from xcrack.view import pyvista as plot_pyvista
 
     return plot_pyvista.draw(
         picture, target, window, look.title, look.edges, look.colours(picture.has_sign)
@@ -233,9 +233,9 @@ def _draw_3d(
     cracks = look.cracks(solution) if field in LIP_FIELDS else []
     fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
     if cracks and (renderer == "matplotlib" or (renderer == "auto" and fault)):
-        from xcrack.view import matplotlib_3d as plot_matplotlib_space
+        from xcrack.view import matplotlib as plot_matplotlib
 
-        return plot_matplotlib_space.draw_cracks(
+        return plot_matplotlib.draw_cracks(
             solution, field, cracks, target, window, look.title, look.limits, look.cmap
         )
     if renderer == "matplotlib" or fault:
@@ -260,7 +260,7 @@ def _draw_3d(
         from xcrack.view.scene_3d import load_arrows
 
         arrows = load_arrows(solution)
-    from xcrack.view.pyvista_3d import draw_space
+    from xcrack.view.pyvista import draw_space
 
     edges = look.edges or field == "mesh"
     colours = look.colours(picture.has_sign)
@@ -329,7 +329,7 @@ def _has_display() -> bool:
 
 def _fault_of_pyvista(target: Path | None) -> str:
     """Why pyvista cannot draw this file here, and what to do; empty if it can."""
-    from xcrack.view.pyvista_2d import can_render
+    from xcrack.view.pyvista import can_render
 
     if target is not None and target.suffix.lower() not in RASTER:
         return f"it writes {', '.join(RASTER)}, not {value_text(target.suffix)}"

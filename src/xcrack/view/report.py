@@ -13,22 +13,19 @@ from numpy.typing import NDArray
 from xcrack.base.arguments import CheckedBy, FilePath, Number, Part, Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, XcrackError, warn
+from xcrack.base.machine import versions
 from xcrack.base.markup import Markup, element, join_parts, list_markup, page
 from xcrack.base.paths import write_texts
 from xcrack.base.units import STRESS
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.runs.inspection import Inspection
 from xcrack.runs.life import Life
-from xcrack.runs.versions import versions
-from xcrack.view import report_histories as histories
 from xcrack.view import report_results as results
-from xcrack.view import report_safety as safety
 from xcrack.view import report_scene as scene
+from xcrack.view import report_summary as front
 from xcrack.view.report_pictures import figure_markup, history_pictures, solution_pictures
 from xcrack.view.report_source import Section, Source, UnitNames, path_or_result, source_of
-from xcrack.view.report_summary import summary
-from xcrack.view.report_viewer import viewer
-from xcrack.view.view_3d import history_layers, packed_layers, solution_layers
+from xcrack.view.report_viewer import history_layers, packed_layers, solution_layers, viewer
 
 _FORMAT = 1
 
@@ -148,14 +145,14 @@ def space_view(source: Source) -> Section | None:
 
 
 SECTIONS: Sequence[Callable[[Source], Section | None]] = (
-    summary,
+    front.summary,
     scene.scene,
     space_view,
     results.growth,
-    histories.spectrum,
+    results.spectrum,
     results.lives,
-    safety.inspections,
-    safety.strength,
+    front.inspections,
+    front.strength,
     results.intensity,
     results.contact,
     scene.assumptions,

@@ -9,6 +9,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import Argument, Declared, arguments_of
 from xcrack.base.arrays import coordinates
+from xcrack.base.machine import versions
 from xcrack.base.markup import Markup, display_text, element, join_parts, list_markup, table
 from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, MOMENT, NUMBER, Dimension
 from xcrack.crack.crack import Crack
@@ -16,7 +17,6 @@ from xcrack.crack.measures import Measures, measures
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Condition
-from xcrack.runs.versions import versions
 from xcrack.sif.sif import SIF
 from xcrack.view.report_source import Section, Source, UnitNames, setting_words
 

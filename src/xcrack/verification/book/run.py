@@ -12,8 +12,7 @@ from types import ModuleType
 from xcrack.base.errors import ProblemError, collected_warnings
 from xcrack.base.optional import require_package
 from xcrack.verification.book import cases as package
-from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.requirements import REQUIREMENTS
+from xcrack.verification.book.case import REQUIREMENTS, Case, Value
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import entries, number
 from xcrack.base.errors import ProblemError, XcrackError, collected_warnings
 from xcrack.model.problem import Problem
-from xcrack.verification.charting.meshes import smallest
 from xcrack.verification.charting.result import ChartRow
+from xcrack.verification.charting.settings import smallest
 from xcrack.verification.charting.values import Sampled, at_places, sampled
 
 _NAME = "adapt"

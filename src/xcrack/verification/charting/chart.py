@@ -35,13 +35,16 @@ from xcrack.verification.charting.adapted import (
     row_of,
     tolerances_to_run,
 )
-from xcrack.verification.charting.meshes import checked_meshes, made, mean_size, smallest
 from xcrack.verification.charting.result import Chart, ChartRow, WantedError
 from xcrack.verification.charting.settings import (
     IN_PROBLEM,
     Named,
+    checked_meshes,
     default_settings,
+    made,
+    mean_size,
     named_settings,
+    smallest,
     with_lengths,
 )
 from xcrack.verification.charting.values import K_of_all, Sampled, at_places, most_trusted, plain

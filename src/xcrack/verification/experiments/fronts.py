@@ -16,9 +16,8 @@ from xcrack.model.loads import traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity
-from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.experiment import Experiment, Trial, by_others, grown
 from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, Picture
-from xcrack.verification.experiments.trial import Trial, by_others, grown
 
 _CELL, _DA, _STEPS = 0.35, 0.4, 9  # of the bar, mm
 _NEAR = 0.08  # share of the thickness over which the end of a front is taken as straight

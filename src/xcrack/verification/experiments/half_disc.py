@@ -15,7 +15,7 @@ from xcrack.model.loads import displacement
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.model.supports import fix
-from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.experiment import Experiment, Trial, by_others, grown, outline
 from xcrack.verification.experiments.outcome import (
     Comparison,
     Curve,
@@ -24,7 +24,6 @@ from xcrack.verification.experiments.outcome import (
     distances,
     path_comparisons,
 )
-from xcrack.verification.experiments.trial import Trial, by_others, grown, outline
 
 _FINE, _COARSE = (0.6, 1.0), (1.0, 1.8)  # cell along the path and length of a step, mm
 _RMS = 2.0

@@ -17,7 +17,14 @@ from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Support, fix
 from xcrack.runs.history import History
-from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.experiment import (
+    ROOT_M,
+    Experiment,
+    Trial,
+    arc_of,
+    grown,
+    outline,
+)
 from xcrack.verification.experiments.outcome import (
     Comparison,
     Curve,
@@ -26,7 +33,6 @@ from xcrack.verification.experiments.outcome import (
     Role,
     path_comparisons,
 )
-from xcrack.verification.experiments.trial import ROOT_M, Trial, arc_of, grown, outline
 
 _FINE, _COARSE = (0.7, 0.8), (1.0, 1.2)  # cell along the path and length of a step, mm
 _SUPPORTS = {

@@ -11,9 +11,8 @@ from xcrack.model.loads import resultant
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity
-from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.experiment import ROOT_M, Experiment, Trial
 from xcrack.verification.experiments.outcome import Comparison, Curve, Outcome, Picture
-from xcrack.verification.experiments.trial import ROOT_M, Trial
 
 _FINE, _COARSE = 1.0, 2.0
 _WITHIN = 8.0  # degrees, up to 45 degrees of loading

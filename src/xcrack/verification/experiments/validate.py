@@ -12,30 +12,27 @@ from typing import Annotated
 from xcrack.base.arguments import FilePath, Switch, Text, check_arguments
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError, collected_warnings
+from xcrack.base.machine import versions
 from xcrack.base.optional import require_package
 from xcrack.base.paths import system_errors, write_texts
-from xcrack.runs.versions import versions
 from xcrack.verification.experiments import (
     fronts,
     half_disc,
-    overload,
+    lives,
     rethore,
     shear,
-    virkler,
     wagner,
 )
-from xcrack.verification.experiments.experiment import Experiment, read_experiment
+from xcrack.verification.experiments.experiment import Experiment, Trial, read_experiment
 from xcrack.verification.experiments.outcome import Outcome
 from xcrack.verification.experiments.page import validation_page
-from xcrack.verification.experiments.trial import Trial
 
 TRIALS: tuple[Trial, ...] = (
     *wagner.TRIALS,
     *rethore.TRIALS,
     *half_disc.TRIALS,
     *shear.TRIALS,
-    *virkler.TRIALS,
-    *overload.TRIALS,
+    *lives.TRIALS,
     *fronts.TRIALS,
 )
 _UNWRITTEN = "the results cannot be written to"

@@ -15,7 +15,15 @@ from xcrack.model.loads import bearing
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.runs.history import History
-from xcrack.verification.experiments.experiment import Experiment
+from xcrack.verification.experiments.experiment import (
+    ROOT_M,
+    Experiment,
+    Trial,
+    by_others,
+    driving,
+    grown,
+    outline,
+)
 from xcrack.verification.experiments.outcome import (
     Comparison,
     Curve,
@@ -24,7 +32,6 @@ from xcrack.verification.experiments.outcome import (
     distances,
     path_comparisons,
 )
-from xcrack.verification.experiments.trial import ROOT_M, Trial, by_others, driving, grown, outline
 
 _FINE = (0.4, 0.5)  # cell along the path and length of a step, mm
 _COARSE = (0.7, 0.9)

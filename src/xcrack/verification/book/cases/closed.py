@@ -8,7 +8,7 @@ from xcrack.analysis.solve import solve
 from xcrack.crack.lines import line_crack
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.output.norms import energy_error
+from xcrack.output.opening import energy_error
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.scenes_2d import (
@@ -22,7 +22,7 @@ from xcrack.verification.book.scenes_2d import (
     tractions,
     turned,
 )
-from xcrack.verification.exact import closed, holes
+from xcrack.verification.exact import closed, plates
 
 _INNER, _OUTER = 0.5, 1.5
 _ROOT = np.sqrt(np.pi)
@@ -34,7 +34,7 @@ def _ring(level: int, order: int) -> list[Value]:
     n = 6 * 2**level
     p = _OUTER**2 / (_OUTER**2 - _INNER**2)
     field = turned(
-        lambda x, y: holes.lame_cylinder(x, y, _INNER, _OUTER, 0.0, 1.0, E, NU), (0.0, 0.0)
+        lambda x, y: plates.lame_cylinder(x, y, _INNER, _OUTER, 0.0, 1.0, E, NU), (0.0, 0.0)
     )
     ahead = rows(0.4)[0]
     problem = Problem(

@@ -11,7 +11,7 @@ from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
-from xcrack.verification.exact import holes
+from xcrack.verification.exact import plates
 
 _R, _T, _A = 2.0, 2.0, 1.0
 _OUTER = 16.0
@@ -56,7 +56,7 @@ def _plate(h: float) -> Mesh:
 
 def _pull(x: Floats, normal: Floats) -> Floats:
     """Tractions of the infinite plate with its hole under unit tension along y (Kirsch)."""
-    stress = holes.kirsch(x[:, 0], x[:, 1], _R, 1.0, 0.3, 1.0, np.pi / 2, plane="stress")[1]
+    stress = plates.kirsch(x[:, 0], x[:, 1], _R, 1.0, 0.3, 1.0, np.pi / 2, plane="stress")[1]
     xx, yy, xy = stress.T
     result = np.zeros((len(x), 3))
     result[:, 0] = xx * normal[:, 0] + xy * normal[:, 1]
@@ -78,7 +78,7 @@ def _run(level: int) -> list[Value]:
     values = []
     for angle in _ANGLES:
         K = float(np.interp(np.radians(angle), phi[order], sif.K_I[order]))
-        fit = float(holes.newman_raju_at_hole(np.radians(angle), _A, _A, _T, _R))
+        fit = float(plates.newman_raju_at_hole(np.radians(angle), _A, _A, _T, _R))
         values.append(Value(f"K_I at {angle} degrees", K, fit, _WITHIN))
     return values
 

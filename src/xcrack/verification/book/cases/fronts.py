@@ -1,4 +1,4 @@
-"""K along fronts: pennies and ellipses under tension and shear, open and pressed together."""
+"""K along fronts: pennies and ellipses in a wide body, surface and corner cracks of a plate."""
 
 from functools import partial
 from typing import Any
@@ -6,9 +6,14 @@ from typing import Any
 import numpy as np
 
 from xcrack.analysis.solve import solve
+from xcrack.crack.surfaces import elliptic_crack
+from xcrack.model.loads import traction
+from xcrack.model.material import Isotropic
+from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.scenes_3d import Stress, exact_K, flat_crack
+from xcrack.verification.book.scenes_3d import Stress, exact_K, flat_crack, graded, lines
+from xcrack.verification.exact import plates
 
 _MIXED: Stress = (1.0, 0.3, 0.2)
 _CLOSED: Stress = (-1.0, 0.3, 0.2)
@@ -53,7 +58,7 @@ def _closed(level: int) -> list[Value]:
     ]  # fmt: skip
 
 
-CASES = (
+_IN_SPACE = (
     Case("penny-1", "K_fronts", _PENNY, "exact", 3, 1, False,
          partial(_open, h=0.17, b=None, order=1), 2),
     Case("penny-2", "K_fronts", _PENNY, "exact", 3, 2, False,
@@ -63,6 +68,50 @@ CASES = (
          quick=False),
     Case("penny-closed-1", "sliding", _PENNY, "exact", 3, 1, True, _closed, 2),
 )  # fmt: skip
+
+
+# --- surface and corner cracks in a wide plate, by the fits of Newman and Raju ---
+
+
+_A, _C, _T, _B = 0.4, 0.5, 1.0, 4.0
+_FIT = "fit to finite elements, good to 5 % (Newman and Raju, 1981)"
+
+
+def _at_surface_run(level: int, corner: bool) -> list[Value]:
+    h = 0.15 / 2**level
+    low = 0.0 if corner else -_B
+    fine = (0.0 if corner else -_C - 0.15, _C + 0.15)
+    problem = Problem(
+        graded(
+            [
+                lines(low, _B, fine, h),
+                lines(-4.0, 4.0, (-0.2, 0.2), h),
+                lines(-_T, 0.0, (-_A - 0.15, 0.0), h),
+            ],
+            seed=511,
+        ),
+        Isotropic(E=1.0, nu=0.3),
+        [elliptic_crack((0.0, 0.0071, 0.0), (0, 1, 0), (1, 0, 0), _C, _A)],
+        loads=[traction("back", (0.0, 1.0, 0.0)), traction("front", (0.0, -1.0, 0.0))],
+    )
+    sif = stress_intensity(solve(problem))
+    phi = np.arctan2(np.maximum(-sif.x[:, 2], 0) / _A, sif.x[:, 0] / _C)
+    table = plates.newman_raju_corner if corner else plates.newman_raju_surface
+    ratio = (sif.K_I / table(phi, _A, _C, _T, _B))[~sif.at_surface]
+    return [
+        Value("mean K_I over the fit", float(ratio.mean()), 1.0, 0.05),
+        Value("largest difference", float(np.abs(ratio - 1).max()), 0.0, 0.1, 1.0),
+    ]
+
+
+_AT_SURFACE = tuple(
+    Case("corner-crack" if corner else "surface-crack", "K_surface", _FIT, "published", 3, 2,
+         False, partial(_at_surface_run, corner=corner), 2)
+    for corner in (False, True)
+)  # fmt: skip
+
+
+CASES = (*_IN_SPACE, *_AT_SURFACE)
 
 
 __all__ = ["CASES"]

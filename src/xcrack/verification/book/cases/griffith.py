@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solve import solve
 from xcrack.fatigue.criteria import max_hoop_stress
 from xcrack.model.numerics import Numerics
-from xcrack.output.norms import energy_error
+from xcrack.output.opening import energy_error
 from xcrack.sif.sif import SIF
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value

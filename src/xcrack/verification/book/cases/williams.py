@@ -6,7 +6,7 @@ import numpy as np
 
 from xcrack.analysis.solve import solve
 from xcrack.model.numerics import Numerics
-from xcrack.output.norms import energy_error
+from xcrack.output.opening import energy_error
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.scenes_2d import NU, E, edge_line, on_box, perturbed, turned
