@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.rows import slow
 from xcrack import Crack, Mesh
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.measures import area_inside
@@ -94,7 +95,9 @@ def shortest_way(x, start: float, centre: float, radius: float):
     return np.where(shadow, round_it, x[:, 0] - start), r > radius
 
 
-@pytest.mark.parametrize(("ratio", "counts"), [(0.6, [1]), (1.5, [1, 2, 1]), (2.5, [1, 2, 1])])
+@pytest.mark.parametrize(
+    ("ratio", "counts"), [*slow((0.6, [1]), (1.5, [1, 2, 1])), (2.5, [1, 2, 1])]
+)
 def test_an_even_front_passes_a_hole(tmp_path, ratio, counts):
     """Two arms beside a hole wider than two cells, one front behind; the area is Huygens'.
 
@@ -126,8 +129,12 @@ def test_an_even_front_passes_a_hole(tmp_path, ratio, counts):
     "holes",
     [
         pytest.param([(-0.4, 0, -0.05, 0.6, 0.15)], id="blind"),
-        pytest.param([(-0.4, 0, 0.03, 0.15)], id="cavity"),
-        pytest.param([(-0.4, 0.28, -0.5, 1.0, 0.12), (-0.4, -0.28, -0.5, 1.0, 0.12)], id="abreast"),
+        pytest.param([(-0.4, 0, 0.03, 0.15)], id="cavity", marks=pytest.mark.slow),
+        pytest.param(
+            [(-0.4, 0.28, -0.5, 1.0, 0.12), (-0.4, -0.28, -0.5, 1.0, 0.12)],
+            id="abreast",
+            marks=pytest.mark.slow,
+        ),
         pytest.param([(-0.6, 0, -0.5, 1.0, 0.12), (0.0, -0.1, -0.5, 1.0, 0.15)], id="in a row"),
     ],
 )

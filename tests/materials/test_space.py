@@ -7,6 +7,7 @@ import pytest
 
 import xcrack as xc
 from support import materials as scenes
+from support.rows import slow
 
 ROLLERS = [xc.displacement("front", (None, None, 0.0)), xc.displacement("back", (None, None, 0.0))]
 PULL = [xc.traction("top", (0.0, 1.0, 0.0)), xc.traction("bottom", (0.0, -1.0, 0.0))]
@@ -201,7 +202,7 @@ def test_a_front_in_a_body_that_is_graded_across_it(case):
     assert np.abs(sif.K[:, 1:]).max() <= 3e-3 * K
 
 
-@pytest.mark.parametrize("kind", ["two", "graded"])
+@pytest.mark.parametrize("kind", ["two", *slow("graded")])
 def test_materials_that_all_but_agree_give_the_K_of_one(kind):
     """A closed front through both, and one along which the modulus changes by round-off."""
     mesh = scenes.perturbed((6, 6, 6), 0)
