@@ -169,6 +169,8 @@ def test_halving_both_sizes_halves_the_cells_at_the_crack(bar):
     assert missed[0] / missed[1] > 2
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.gmsh
 def test_same_call_same_mesh_also_inside_a_session_of_the_user(bar):
     with session(Mesh__Algorithm3D=10, Geometry__OCCUnionUnify=1) as gmsh:
@@ -178,6 +180,8 @@ def test_same_call_same_mesh_also_inside_a_session_of_the_user(bar):
     np.testing.assert_array_equal(again.cells, bar.cells)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 @pytest.mark.gmsh
 def test_units_do_not_matter(bar):
     unit = 2.0**-37

@@ -257,6 +257,8 @@ def test_a_hole_becomes_round():
     assert 0 < errors[2] < errors[1] / 2.5 < errors[0] / 2.5
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_an_edge_between_a_curved_side_and_a_flat_one_stays_on_both():
     """Points of the mouth of a notch lie in its face and on the cylinder."""
     slope = math.tan(math.pi / 6)

@@ -84,6 +84,8 @@ def test_a_sheet_is_a_2d_body_and_sizes_follow_a_function(tmp_path: Path) -> Non
     assert mesh.cell_size[middle < 2].mean() < 0.6 * mesh.cell_size[middle > 8].mean()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_what_is_no_body_says_so(tmp_path: Path) -> None:
     with pytest.raises(GeometryError, match="no closed body: its 5 faces"):
         xc.mesh_step(step(tmp_path, without_a_face), size=0.5)

@@ -162,6 +162,8 @@ def bending(factor):
     return loads(lambda x: factor * (np.sin(x) + 0.45))
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_state_has_its_bits_whoever_runs_beside_it():
     """Open, half closed and closed states, together, in another order, alone, with threads."""
     problem = block()

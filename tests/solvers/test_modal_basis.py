@@ -182,6 +182,8 @@ def test_closed_lips_carry_the_pressure():
     assert contact.closed.all()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_in_space_both_solvers_agree():
     """Modes I to III at each point, in the frame of the nearest vertex of the front."""
     K, energy = [], []

@@ -14,6 +14,7 @@ import threadpoolctl
 
 import xcrack as xc
 from support import scenes_2d as scenes
+from support.rows import mission
 from xcrack.analysis.solve import solve_states
 from xcrack.base.machine import one_blas_thread
 from xcrack.fem.system import build
@@ -81,7 +82,9 @@ def matrix_of(problem):
     return reduced, (basis.indptr, basis.indices, basis.shape[1], owner, model.space.dim)
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize(
+    "scene", [*(name for name in SCENES if name != "penny"), *mission("penny")]
+)
 @pytest.mark.parametrize(
     "keep",
     [pytest.param(False, marks=(pytest.mark.slow, pytest.mark.mission)), True],

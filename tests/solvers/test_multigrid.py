@@ -7,6 +7,7 @@ import scipy.sparse.linalg as sla
 
 import xcrack as xc
 import xcrack.linalg.multigrid as multigrid
+from support.rows import slow
 from xcrack.fem.assembly import bulk, rigid_modes
 from xcrack.linalg.kernels.cycle import first_step, next_step
 from xcrack.linalg.multigrid import extended_cycle, hierarchy, largest_eigenvalue
@@ -170,7 +171,7 @@ def load(levels, seed=911):
 
 
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("supported", ["foot", "symmetry"])
+@pytest.mark.parametrize("supported", ["foot", *slow("symmetry")])
 def test_against_a_direct_solver(supported, order):
     A, levels, K = operator_of(
         *body((9 - 2 * order, 8, 11 - 2 * order), supported=supported, order=order)

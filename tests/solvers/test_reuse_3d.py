@@ -24,6 +24,8 @@ def scene(radius, **options):
     )  # fmt: skip
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_next_step_starts_from_closed_lips():
     """One solve a state instead of two, and what a fresh start finds."""
     first = solve_states(scene(0.55), [PRESS, PULL])
