@@ -136,6 +136,8 @@ def test_a_missing_package_is_named_and_an_error_does_not_stop_the_others():
     assert not runner.Validation((outcome,), True).passed
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_run_goes_on_with_what_is_stored(tmp_path):
     pytest.importorskip("gmsh")
     page = tmp_path / "page.html"
