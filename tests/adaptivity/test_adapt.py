@@ -214,6 +214,8 @@ def test_fewer_unknowns_than_the_first_mesh():
         xc.adapt(edge(), 1e-3, max_unknowns=10, progress=False)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_crack_that_carries_nothing_is_named():
     """Compressed along itself only: K is round-off, and nothing is relative to it."""
     push = [xc.traction("left", (1.0, 0.0)), xc.traction("right", (-1.0, 0.0))]

@@ -278,6 +278,8 @@ def check_conditions(problem, solutions):
         assert gap.min() >= -1e-9 * np.abs(solution.u).max()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_100_drawn_states_are_solved():
     for seed in range(13):
         problem, states = rubbing.drawn(6100 + seed, largest=14)

@@ -108,6 +108,7 @@ def test_stick_by_conjugate_gradients():
     assert np.abs(np.linalg.norm(contact.shear, axis=1) - TAU).max() <= 1e-6
 
 
+@pytest.mark.slow
 def test_a_path_of_shear():
     """Up to TAU and down to -TAU: K_II follows what friction cannot carry."""
     mu = 0.2
@@ -120,6 +121,8 @@ def test_a_path_of_shear():
     assert max(K_errors(down, Q, -felt)) <= 8e-2
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_growth_carries_slip():
     mesh = xc.box((-1, -1, -1), (1, 1, 1), 5)
     crack = xc.penny_crack((0, 0, 0.03), (0, 0, 1), 0.5)

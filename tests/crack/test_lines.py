@@ -128,6 +128,8 @@ def cracks_on_one_line(rng, first, last):
     return [xc.line_crack(one), xc.line_crack([x + first * along, x + last * along])]
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_cracks_on_one_line():
     """Apart they are two cracks; what overlaps or touches is refused."""
     for seed in range(400):

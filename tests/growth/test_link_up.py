@@ -44,6 +44,8 @@ def test_two_tips_link_up_by_the_formula_of_swift():
     assert min(strength[:-1]) > STRESS >= strength[-1]
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_without_zones_the_same_run_goes_on():
     response = formula(mode_I())
     with_zone, without = run(two(), response=response), run(two(), link_up=None, response=response)

@@ -300,6 +300,7 @@ def zipped(files):
     return target.getvalue()
 
 
+@pytest.mark.slow
 def test_files_of_others_in_the_place_of_steps(whole, tmp_path):
     """None ends in a traceback, none is lost, and the run comes out the same."""
     for name, data in junk(whole.path).items():

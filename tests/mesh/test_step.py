@@ -67,6 +67,8 @@ def test_a_plate_with_its_hole_as_a_set(tmp_path: Path) -> None:
     assert len(xc.mesh_step(path, size=2.0, sets={"one": [1]}).facet_sets["one"])
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_parts_are_joined_and_faces_sewn(tmp_path: Path) -> None:
     mesh = xc.mesh_step(step(tmp_path, two_parts), size=0.5)
     assert mesh.volume.sum() == pytest.approx(2, rel=1e-9)

@@ -81,6 +81,8 @@ def test_order_2_star_and_patch_grow_like_plain_elements():
     assert by_size(40, 2, "star", False, n_tips=1) > 1e3 * result[2]
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_order_2_is_flat_over_cut_positions():
     """From a tenth of a cell to the row of nodes itself, and on it."""
     patch = condition_beside_a_row(2, "star", True)

@@ -56,6 +56,8 @@ def test_both_sides_of_a_layer_agree(eps):
     np.testing.assert_allclose(opened(eps), opened(-eps), rtol=1e-3)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_exactly_on_a_layer_a_crack_does_not_vanish():
     """It opens there as it does a thousandth of a cell away, and nodes carry the jump."""
     on = xc.solve(scenes_space.flat_penny(8, 0.0, 0.6, (1.0, 0.5)))

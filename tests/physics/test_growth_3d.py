@@ -157,6 +157,8 @@ def test_inclined_penny_turns_into_mode_I(turned_penny):
     assert all(np.abs(step.sif[0][0].K).max() <= 1e-9 for step in turned_penny)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_penny_across_the_load_stays_round():
     """One advance on eight cells a side: radius grows by da, within 3 % of it."""
     problem = in_cube(8, xc.penny_crack(CENTER, (0, 0, 1), 0.4, n=64))

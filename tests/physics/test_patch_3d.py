@@ -181,6 +181,7 @@ def test_no_option_of_method_spoils_it(numerics):
     assert patch(mesh, [crack], numerics=numerics_of(**numerics)) <= EXACT
 
 
+@pytest.mark.slow
 def test_material_and_units_have_no_part_in_it():
     mesh, crack = scenes.perturbed(6, 78), drawn_penny(713)
     for E, nu in ((1e9, 0.0), (210e3, 0.3), (1.0, 0.49)):

@@ -362,6 +362,8 @@ def test_several_load_states_are_equal_to_one_by_one():
     assert np.abs(K[1] + K[4]).max() <= 1e-6 * K_0  # lips may overlap: contact is off
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_renumbered_nodes_and_cells():
     """To the tolerance of the iteration (round-off with a direct solver)."""
     problem, _ = small(seed=811)

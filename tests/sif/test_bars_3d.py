@@ -78,6 +78,8 @@ def test_finer_cells_at_the_front(n, tilt):
     assert rms(exact - finer.best) < 0.5 * rms(exact - own.K)
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_finer_cells_at_the_front_of_a_surface_crack_and_of_states():
     """Order 1 takes order 2 along; places at a free surface and states at rest have none."""
     mesh = xc.box((-1, -1, -1), (1, 1, 1), 5)

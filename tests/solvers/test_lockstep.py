@@ -189,6 +189,8 @@ def test_a_state_has_its_bits_whoever_runs_beside_it():
     assert together[1].u.tobytes() == alone[0].u.tobytes()
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_multiples_of_a_load_cost_nothing():
     """Half closed too: the same set, scaled; with another sign it is another state."""
     one = xc.solve(block(), states=[bending(1.0)])[0]

@@ -229,6 +229,8 @@ def test_quadratic_functions_take_no_more_steps():
     assert max(steps) <= 20, steps
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_a_thin_plate_and_a_plane_body():
     """The aggregates have no say in the shape of the body or its dimension."""
     for n in ((30, 20, 2), (60, 50)):

@@ -54,6 +54,8 @@ def test_a_crack_that_opens_again_gives_its_multipliers_back():
     assert not opened.report["multipliers of crack 0"].used
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_an_open_crack_is_solved_to_the_end():
     """The rough look at the crack faces is not the answer."""
     result = xc.solve(scene(0.55, loads=PULL))

@@ -47,6 +47,8 @@ def test_iterations_do_not_know_the_offset(order):
     assert np.ptp(energy) <= 3e-3 * energy[0]
 
 
+@pytest.mark.slow
+@pytest.mark.mission
 def test_the_worst_offset():
     """Without the uncut edges this took 68 steps, in larger scenes more than 2000."""
     assert iterations_and_energy(8, 3e-5, 2)[0] <= 25
