@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad
 
 import xcrack as xc
-from xcrack import respond
 from benchmarks.wanted_error import SCENES, against, run, scene
+from xcrack import respond
 from xcrack.growth import cells as mesh_cells
 from xcrack.growth.options import run_of as rule_of
 from xcrack.mesh.locate import cell_sizes
