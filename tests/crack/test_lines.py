@@ -14,7 +14,8 @@ from support.rows import mission
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.fem.level_set import line_levels
-from xcrack.mesh.polygon import boxes_meet, self_crossing
+from xcrack.mesh.polygon import self_crossing
+from xcrack.mesh.simplex import boxes_meet
 
 STEEL = xc.Isotropic(1e5, 0.3, plane="strain")
 BOX = xc.box((-2, -2), (2, 2), 29)

@@ -12,8 +12,8 @@ from xcrack.crack.crack import tip_frames
 from xcrack.crack.placing_2d import place_line
 from xcrack.fem.cut import cut
 from xcrack.fem.level_set import line_levels
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.kernels.location import polyline_distance
-from xcrack.mesh.polygon import closest_on_segment
 
 EXAMPLE_MESHES = Path(__file__).parents[2] / "examples" / "meshes"
 

@@ -14,7 +14,7 @@ from xcrack.crack.crack import tip_frames
 from xcrack.crack.placing_2d import place_line
 from xcrack.fem.cut import cut
 from xcrack.fem.level_set import line_levels
-from xcrack.mesh.polygon import closest_on_segment
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.verification import methods
 from xcrack.verification.methods.level_sets import Nodal, nodal_level_set, nodal_update
 

@@ -10,13 +10,14 @@ from xcrack.crack.placing_3d import place_surface
 from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.distances import (
     closest_in,
+    closest_on_segment,
+    distance_to_simplices,
     first_crossing,
     front_distance,
     signed_in,
     surface_distance,
     triangle_tree,
 )
-from xcrack.mesh.polygon import closest_on_segment, distance_to_simplices
 from xcrack.mesh.triangulation import face_normals, rim, split_sides
 
 ROUND_OFF = 1e-14

@@ -16,6 +16,7 @@ from xcrack.linalg.kernels.sparse import (
     times,
     times_transposed,
 )
+from xcrack.mesh.distances import distance_to_simplices
 from xcrack.mesh.kernels.location import cells_within, locate_points, nearest_segment
 from xcrack.mesh.kernels.splitting import (
     cut_simplices,
@@ -24,7 +25,6 @@ from xcrack.mesh.kernels.splitting import (
     split_segments,
 )
 from xcrack.mesh.locate import cells_around
-from xcrack.mesh.polygon import distance_to_simplices
 
 
 def spd(rng, n):

@@ -11,8 +11,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.measures import area_inside, length_inside
 from xcrack.mesh.locate import Body, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import graded_sizes, with_room
-from xcrack.mesh.refinement import growing_sizes, refine
+from xcrack.mesh.refinement import graded_sizes, growing_sizes, refine, with_room
 from xcrack.mesh.triangulation import loops
 from xcrack.model.problem import Problem
 

@@ -12,9 +12,9 @@ from xcrack.adaptivity.indicators import Indicators, live_states
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import kink_numbers
 from xcrack.crack.measures import length_inside
+from xcrack.mesh.distances import distance_to_simplices
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import distance_to_simplices
 from xcrack.mesh.refinement import growing_sizes, refine, refine_to
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import KErrors

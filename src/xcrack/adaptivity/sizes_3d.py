@@ -23,8 +23,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.measures import surface_size
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import graded_sizes, points_between, radii, with_room
-from xcrack.mesh.refinement import refine
+from xcrack.mesh.refinement import graded_sizes, points_between, radii, refine, with_room
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF, KErrors
 

@@ -341,8 +341,8 @@ def sound_copy(value: T, **fields: Any) -> T:
         Of its fields, in the form in which it keeps them.
     """
     result: T = object.__new__(type(value))
-    kept = vars(value)
-    vars(result).update({name: kept[name] for name in type(value).__dataclass_fields__} | fields)  # type: ignore[attr-defined]
+    values = vars(value)
+    vars(result).update({name: values[name] for name in type(value).__dataclass_fields__} | fields)  # type: ignore[attr-defined]
     return result
 
 

@@ -150,11 +150,11 @@ class FrontCurve:
         rows = np.nonzero(sample >= 0)[0]
         picked = np.ascontiguousarray(x[rows], dtype=float)
         curve = (self.breaks, self.place, self.normal, self.closed)
-        found = FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
+        points = FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
         if not any(self.is_cut):
-            return rows, found
-        own = ~((self.is_cut[0] & (found.s < 0)) | (self.is_cut[1] & (found.s > self.length)))
-        return rows[own], found.chosen(own)
+            return rows, points
+        own = ~((self.is_cut[0] & (points.s < 0)) | (self.is_cut[1] & (points.s > self.length)))
+        return rows[own], points.chosen(own)
 
     def distance(self, x: Floats, bound: float = np.inf) -> Floats:
         """Distance of points to the samples of the front `(q,)`; inf beyond a bound, length.

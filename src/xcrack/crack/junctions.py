@@ -14,9 +14,9 @@ from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import CoarseMeshError, GeometryError
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.lines import crossing_points, polyline_crack
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.locate import cells_at, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import closest_on_segment
 from xcrack.mesh.simplex import leg_size
 
 _ON = 0.1  # share of a cell within which an end is meant to lie on another crack

@@ -9,7 +9,8 @@ from xcrack.base.arguments import Points, check_arguments
 from xcrack.base.arrays import Bools, Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.mesh.polygon import boxes_meet, closest_on_segment
+from xcrack.mesh.distances import closest_on_segment
+from xcrack.mesh.simplex import boxes_meet
 
 _SAME = 1e-9  # share of its length within which points of a line are the same, or it touches itself
 _PARALLEL = 1e-10  # sine up to which pieces cross nowhere: they touch along a length, or not at all

@@ -12,10 +12,9 @@ from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.junctions_3d import body_of
 from xcrack.crack.stations import place_crack
-from xcrack.mesh.distances import signed_in
+from xcrack.mesh.distances import distance_to_simplices, signed_in
 from xcrack.mesh.locate import Body, parts_inside
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import distance_to_simplices
 
 # Length of a 2D crack in the body.
 

@@ -14,9 +14,9 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.advance_2d import with_tips
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.lines import crossing_points, polyline_crack
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import closest_on_segment
 
 # Tips of all 2D cracks as rows of one array, and cracks that end at given places.
 

@@ -9,6 +9,7 @@ from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.junctions import Junction, junctions
 from xcrack.crack.lines import crossing_points, touching_points
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.locate import (
     barycentric,
     cell_sizes,
@@ -20,7 +21,6 @@ from xcrack.mesh.locate import (
     parts_inside,
 )
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import closest_on_segment
 
 ON_MESH = 1e-10  # share of a cell within which a tip lies on a mesh point or on an edge
 # Share of a cell within which a tip or kink is moved there. A tip on a mesh point and one beside it

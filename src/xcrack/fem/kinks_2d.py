@@ -14,9 +14,9 @@ import numpy as np
 from xcrack.base.arrays import Floats, Ints, lock
 from xcrack.crack.crack import kink_numbers, turns
 from xcrack.fem.level_set import SNAP, LevelSet
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.locate import barycentric, cells_around, cells_within
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import closest_on_segment
 
 _REACH = 2.0  # cells at a kink: beyond, the level set is linear in the cells that a piece crosses
 # From this turn on the wedge between the pieces is too thin for the functions of a cell: it stays

@@ -12,8 +12,7 @@ from xcrack.crack.placing_2d import ON_MESH
 from xcrack.mesh.distances import TriangleTree, front_distance, signed_in, triangle_tree
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
-from xcrack.mesh.polygon import boxes_meet
-from xcrack.mesh.simplex import simplex_rule
+from xcrack.mesh.simplex import boxes_meet, simplex_rule
 from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
 
 SNAP = 1e-10  # share of an edge below which a cut point is moved onto its end

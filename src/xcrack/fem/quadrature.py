@@ -12,8 +12,8 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets, ranges
 from xcrack.base.errors import GeometryError
 from xcrack.fem.function_space import FunctionSpace
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.mesh import local_edges
-from xcrack.mesh.polygon import closest_on_segment
 from xcrack.mesh.simplex import SYMMETRIC, cut_simplices, gauss, simplex_rule
 
 # Integration points around the tips of cracks in 2D.

@@ -41,8 +41,7 @@ from xcrack.growth.tips import LONGER_FIRST
 from xcrack.growth.uncertainty import TOGETHER
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import graded_sizes
-from xcrack.mesh.refinement import growing_sizes, refine
+from xcrack.mesh.refinement import graded_sizes, growing_sizes, refine
 from xcrack.model.problem import Problem
 
 # The mesh that a run begins with, and that of each step.

@@ -14,7 +14,6 @@ from xcrack.crack.meetings import LEAST, joined, meetings
 from xcrack.crack.placing_3d import place_arms
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth import fronts
-from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import advanced_crack, front_lengths, interpolate_along_front
 from xcrack.growth.interfaces import (
     InterfacesAhead,
@@ -29,7 +28,7 @@ from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates, rates_by_law_of
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
-from xcrack.growth.step import Plan, Step, StepError, moved_places, plan_of, solves_of
+from xcrack.growth.step import Corrected, Plan, Step, StepError, moved_places, plan_of, solves_of
 from xcrack.growth.step_length import longest
 from xcrack.mesh.locate import cell_sizes
 

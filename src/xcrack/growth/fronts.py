@@ -26,7 +26,6 @@ from xcrack.fatigue.retardation import (
     march,
     no_zones,
 )
-from xcrack.growth.corrected import Corrected
 from xcrack.growth.front_filter import (
     FrontWaves,
     corrected,
@@ -47,7 +46,7 @@ from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates, block_order, kinds_of
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, directions
-from xcrack.growth.step import Plan, Step, StepError, plan_of, solves_of
+from xcrack.growth.step import Corrected, Plan, Step, StepError, plan_of, solves_of
 from xcrack.growth.step_length import first_control, longest, next_control, share_left
 from xcrack.mesh.distances import front_distance
 from xcrack.mesh.locate import Body, cell_sizes

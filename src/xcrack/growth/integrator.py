@@ -4,11 +4,10 @@ from typing import Protocol
 
 from xcrack.base.arrays import Floats
 from xcrack.growth import euler, fronts, tips
-from xcrack.growth.corrected import Corrected
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
-from xcrack.growth.step import Plan, Step
+from xcrack.growth.step import Corrected, Plan, Step
 
 
 class Integrator(Protocol):

@@ -39,13 +39,12 @@ from xcrack.crack.merging import (
 from xcrack.crack.placing_3d import meeting_points, place_arm, place_arms
 from xcrack.fem.system import discretise
 from xcrack.growth import euler, fronts
-from xcrack.growth.corrected import Corrected
 from xcrack.growth.fronts import interpolate_along_front
 from xcrack.growth.gaps import UNKNOWN, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
-from xcrack.growth.step import Join, Plan, Step, StepError, plan_of, solves_of
+from xcrack.growth.step import Corrected, Join, Plan, Step, StepError, plan_of, solves_of
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.mesh import Mesh

@@ -367,6 +367,36 @@ _MADE_BY_GROW = {
 
 
 @dataclass(frozen=True, eq=False)
+class Corrected:
+    """Where growth has come to at a solve, and what the next step goes on from.
+
+    Attributes
+    ----------
+    cycles : float
+        Until the corrected cracks are reached.
+    cracks : tuple of Crack
+        From which growth goes on.
+    stations : GrowthStations
+        Their ends.
+    solves : SolveHistory
+        At these.
+    error : StepError, optional
+    control : StepControl
+    zones, earlier_zones : OverloadZones, optional
+        What overloads have left at the stations, and at the begin of the step.
+    """
+
+    cycles: float
+    cracks: tuple[Crack, ...]
+    stations: GrowthStations
+    solves: SolveHistory
+    error: StepError | None = None
+    control: StepControl = field(default_factory=StepControl)
+    zones: OverloadZones | None = None
+    earlier_zones: OverloadZones | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One state of the cracks during growth.
 
@@ -639,6 +669,7 @@ def place_name(step: Step, c: int, j: int) -> str:
 
 __all__ = [
     "Arrival",
+    "Corrected",
     "Event",
     "Join",
     "Plan",

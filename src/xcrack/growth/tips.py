@@ -29,7 +29,6 @@ from xcrack.crack.placing_2d import MOUTH
 from xcrack.fatigue.criteria import START, clipped_K, kinked_K, limit_angles
 from xcrack.fatigue.retardation import BlockCycles, no_zones
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.corrected import Corrected
 from xcrack.growth.gaps import UNKNOWN, part_of_time
 from xcrack.growth.interfaces import (
     InterfacesAhead,
@@ -58,6 +57,7 @@ from xcrack.growth.solves import (
 )
 from xcrack.growth.stations import GrowthStations, Identities
 from xcrack.growth.step import (
+    Corrected,
     Plan,
     Step,
     StepControl,

@@ -8,11 +8,10 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.corrected import Corrected
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates, criterion_inputs, rates_of
 from xcrack.growth.response import Answers
-from xcrack.growth.step import Step
+from xcrack.growth.step import Corrected, Step
 from xcrack.sif.sif import SIF, bars_of
 
 # Of the sum of all steps with one sign: each bar holds for almost all single K, and what they err

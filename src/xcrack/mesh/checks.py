@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from xcrack.base.arrays import Floats, Ints, at, ranges, row_stretches
 from xcrack.base.checks import numbers, point_coordinates, value_text, whole_numbers
 from xcrack.base.errors import MeshError
-from xcrack.mesh.polygon import distance_to_simplices
+from xcrack.mesh.distances import distance_to_simplices
 
 _FLAT = 1e-12  # a cell whose volume is below this share of (longest edge)^d has no shape
 _SAME = 1e-6  # of a facet: points this close to each other, or to a facet, are on each other

@@ -14,7 +14,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import MeshError, warn
-from xcrack.mesh.polygon import closest_on_segment
+from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.raw import RawMesh
 
 _Faces = tuple[tuple[int, ...], ...]

@@ -11,7 +11,7 @@ from math import factorial
 import numpy as np
 from scipy.special import roots_jacobi
 
-from xcrack.base.arrays import Floats, Ints, lock
+from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import ProblemError
 from xcrack.mesh.mesh import Mesh, local_edges
 
@@ -270,3 +270,10 @@ def _arrays(phi: Floats, x: Floats | None) -> tuple[Floats, Floats]:
     """Both as kernels take them."""
     vertices = np.zeros((0, phi.shape[1], 1)) if x is None else np.ascontiguousarray(x)
     return np.ascontiguousarray(phi), vertices
+
+
+def boxes_meet(a: Floats, b: Floats, c: Floats, d: Floats, reach: float = 0.0) -> Bools:
+    """Whether the boxes along the axes around segments ab and cd `(..., d)` come within a reach."""
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.asarray((low <= high + reach).all(axis=-1))

@@ -15,10 +15,10 @@ from xcrack.crack.crack import kink_numbers
 from xcrack.estimate.estimate import Estimate, estimate
 from xcrack.estimate.shape import crack_shape, rim_shape
 from xcrack.estimate.surplus import shares
+from xcrack.mesh.distances import distance_to_simplices
 from xcrack.mesh.locate import cell_sizes, contains
 from xcrack.mesh.mesh import Mesh
-from xcrack.mesh.polygon import distance_to_simplices, points_between
-from xcrack.mesh.refinement import refine
+from xcrack.mesh.refinement import points_between, refine
 from xcrack.model.material import isotropic_part
 from xcrack.model.problem import Problem
 from xcrack.sif.accuracy import BESIDE, Domain
