@@ -1,5 +1,7 @@
 """Growth to a wanted error: lives and paths against exact ones, bars, resuming, refusals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -149,7 +151,10 @@ def two_sheets():
 
 @pytest.mark.slow
 def test_a_tolerance_over_a_meeting_in_space():
-    """Cells along the fronts are smaller before and after it; no life is compared."""
+    """Cells along the fronts are smaller before and after it.
+
+    The life until then is that of a finer mesh in finer steps (1.4 % were measured).
+    """
     history = xc.collect(
         xc.grow(**run_of(two_sheets(), tolerance=0.04)),
         until=lambda step: len(step.cracks) == 1 and not step.joins,
@@ -160,6 +165,11 @@ def test_a_tolerance_over_a_meeting_in_space():
     met = history.steps[2]
     assert met.joins
     assert met.error.life >= history.steps[1].error.life
+    finer = replace(two_sheets(), mesh=xc.box((-1.5, -0.25, -1.0), (1.5, 0.25, 1.0), (30, 4, 20)))
+    fixed = xc.collect(
+        xc.grow(**run_of(finer, da=0.04, max_steps=12)), until=lambda step: bool(step.joins)
+    )
+    assert abs(met.cycles / fixed.life - 1) <= 0.04
 
 
 # Meshes ----------------------------------------------------------------------------------------
