@@ -57,15 +57,15 @@ def check_law(
     R = np.tile(ratios, 9)
     size = np.full(len(dK), a)
 
-    def asked(dK: Floats, R: Floats) -> Floats:
+    def law_of_user(dK: Floats, R: Floats) -> Floats:
         return law(dK, R, **law_needs(law, dK, R, size[: len(dK)]))
 
-    rate = _call_law(asked, (dK, R), wrong, "da/dN")
+    rate = _call_law(law_of_user, (dK, R), wrong, "da/dN")
     if rate is not None:
         if rate.shape != dK.shape:
             wrong.append(f"for {len(dK)} points it returns shape {rate.shape}, not {dK.shape}")
         else:
-            _check_rates(asked, dK, R, rate, wrong)
+            _check_rates(law_of_user, dK, R, rate, wrong)
     _judge("law", law, wrong)
 
 

@@ -228,6 +228,22 @@ def test_an_unknown_option_is_refused_by_the_name_of_the_function(name: str) -> 
         getattr(xcrack, name)(*positional, dA=1.0)
 
 
+def test_variables_are_not_named_by_an_adjective_alone() -> None:
+    """In the product: a mask is `is_of_crack`, a length aimed at `target`, the names `names`."""
+    bare = {"own", "wanted", "asked", "seen", "settled"}
+    public = SOURCE / "verification" / "charting"  # `wanted` is an argument of `xc.chart`
+    bad = [
+        f"{path.relative_to(SOURCE)}:{node.lineno}: {name}"
+        for path in sorted(SOURCE.rglob("*.py"))
+        if public not in path.parents
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Name | ast.arg)
+        for name in [node.id if isinstance(node, ast.Name) else node.arg]
+        if name.strip("_") in bare
+    ]
+    assert not bad, "\n".join(bad)
+
+
 def test_no_variable_has_a_name_that_says_nothing() -> None:
     """What a name holds is in it: a message, a result, a support; not that it was found or kept."""
     vague = {"said", "told", "found", "kept", "held"}

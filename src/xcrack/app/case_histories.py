@@ -85,8 +85,8 @@ def loading(table: Table) -> Cycle | Spectrum:
     if kind not in _HISTORIES:
         given.refuse("kind", f"{kind!r:.40} is not known: known are {', '.join(_HISTORIES)}.")
     maker = _HISTORIES[kind]
-    own = list(arguments_of(maker)) if maker else [kind, *(["sequence"] * (kind == "states"))]
-    given.known(["kind", *own, *_CHOICES], f" of {kind!r}")
+    names = list(arguments_of(maker)) if maker else [kind, *(["sequence"] * (kind == "states"))]
+    given.known(["kind", *names, *_CHOICES], f" of {kind!r}")
     choices: dict[str, Any] = {
         name: (
             tuple(value_of_table(load, makers_of(Load)) for load in given.tables(name))
@@ -100,14 +100,14 @@ def loading(table: Table) -> Cycle | Spectrum:
         if maker is not None:
             content = {n: v for n, v in given.content.items() if n not in _CHOICES and n != "kind"}
             return replace(called_with(Table(given.source, given.key, content), maker), **choices)
-        for name in own:
+        for name in names:
             if name not in given:
                 given.refuse("", f"the key {name!r} of {kind!r} is missing: give it.")
         forms: dict[str, Any] = {
             name: load_states(given, name)
             if name == "states"
             else argument_of(given, name, Spectrum)
-            for name in own
+            for name in names
         }
         return Spectrum(**forms, **choices)
     except XcrackError as error:
@@ -263,9 +263,9 @@ def retarded_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
     """
     if not isinstance(growth["cycle"], Spectrum):
         table.refuse("", "overloads are of a spectrum: give [growth.spectrum] in place of a cycle.")
-    own = [name for name in arguments_of(retarded) if name not in (*_OF_RUN, "model")]
-    given = {name: argument_of(table, name, retarded) for name in own if name in table}
-    content = {name: value for name, value in table.content.items() if name not in own}
+    names = [name for name in arguments_of(retarded) if name not in (*_OF_RUN, "model")]
+    given = {name: argument_of(table, name, retarded) for name in names if name in table}
+    content = {name: value for name, value in table.content.items() if name not in names}
     given["model"] = retardation_of(Table(table.source, table.key, content))
     if isinstance(given["model"], dict):
         table.refuse("", "it is of one model: give kind, its numbers and zone.")

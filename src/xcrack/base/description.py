@@ -265,18 +265,18 @@ class Description:
                     self.add(f"{name}.{key}.{read}", value, owners, True)
 
     def _add_dataclass(self, name: str, value: Any, owners: tuple[int, ...], used: bool) -> None:
-        own = type(value).__module__.startswith(_OWN)
+        is_of_xcrack = type(value).__module__.startswith(_OWN)
         if name:
             self.lines[name] = type(value).__qualname__
         for field in fields(value):
-            if own and not field.metadata.get("changes_results", True):
+            if is_of_xcrack and not field.metadata.get("changes_results", True):
                 continue
             key, item = f"{name}.{field.name}".lstrip("."), getattr(value, field.name)
             before = set(self.lines)
             self.add(key, item, owners, used)
-            if own and is_equal(item, default_of(value, field)):
+            if is_of_xcrack and is_equal(item, default_of(value, field)):
                 self.at_default |= set(self.lines) - before
-        if not own:
+        if not is_of_xcrack:
             self._add_methods(name, type(value), owners)
 
     def _add_object(self, name: str, value: Any, owners: tuple[int, ...], used: bool) -> None:

@@ -107,12 +107,12 @@ def advance_fronts(
     sent, wholes = [], []
     for members, goes_round in chains:
         old, begins = joined_front([fronts[k] for k in members], goes_round)
-        own = np.isin(number, members)
+        is_member = np.isin(number, members)
         shift = np.zeros(len(fronts))
         shift[list(members)] = begins
         wholes.append(old)
-        place = s[own] + shift[number[own]]
-        sent.append(_advanced_points(old, place, angle[own], da[own], size))
+        place = s[is_member] + shift[number[is_member]]
+        sent.append(_advanced_points(old, place, angle[is_member], da[is_member], size))
     meets = np.zeros((0, 3))
     if body is not None and chains == alone and not has_way_to_hole(sent, body):
         body = None  # no hole is near: the way of any front

@@ -153,8 +153,10 @@ class FrontCurve:
         points = FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
         if not any(self.is_cut):
             return rows, points
-        own = ~((self.is_cut[0] & (points.s < 0)) | (self.is_cut[1] & (points.s > self.length)))
-        return rows[own], points.chosen(own)
+        is_on_front = ~(
+            (self.is_cut[0] & (points.s < 0)) | (self.is_cut[1] & (points.s > self.length))
+        )
+        return rows[is_on_front], points.chosen(is_on_front)
 
     def distance(self, x: Floats, bound: float = np.inf) -> Floats:
         """Distance of points to the samples of the front `(q,)`; inf beyond a bound, length.

@@ -149,19 +149,19 @@ def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, agrees: bool) -> li
     for c, crack in enumerate(cracks):
         if not crack.ends_on:
             continue
-        own = i if c == k else c
-        own -= own > k
-        ends = list(result[own].ends_on)
+        number = i if c == k else c
+        number -= number > k
+        ends = list(result[number].ends_on)
         for on, side in crack.ends_on:
             turned = -side if on == k and not agrees else side
             end = ((i if on == k else on) - ((i if on == k else on) > k), turned)
-            if end[0] == own or (end[0], -turned) in ends:
+            if end[0] == number or (end[0], -turned) in ends:
                 raise GeometryError(
                     f"cracks {i} and {k} become one, which would end on itself or on both sides of "
                     "another one: end growth before, and give what has become of them."
                 )
             ends += [end] if end not in ends else []
-        result[own] = replace(result[own], ends_on=tuple(ends))
+        result[number] = replace(result[number], ends_on=tuple(ends))
     return result
 
 
@@ -368,10 +368,10 @@ def with_room(
         ahead, height, along = np.moveaxis(
             np.einsum("mij,mkj->mki", front.frame, x[None] - front.x[:, None]), 2, 0
         )
-        wanted = room * cell[:, None]
+        least_room = room * cell[:, None]
         # A parabola twice as wide as it is high: the front that is led on stays smooth.
-        lead = ahead + wanted - along**2 / (4 * wanted)
-        lead[(np.abs(height) > wanted) | (np.abs(along) > 2 * wanted)] = 0.0
+        lead = ahead + least_room - along**2 / (4 * least_room)
+        lead[(np.abs(height) > least_room) | (np.abs(along) > 2 * least_room)] = 0.0
         is_inside = body.contains(front.x)
         s.append(front.s)
         number.append(np.full(len(front.x), f))

@@ -252,24 +252,24 @@ def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting
     ]
     at_end = {}  # crack and whether it is the first point: where a facing pair meets
     pairs = []
-    for own in met:
-        c, k = tip_of[own.tip]
+    for meeting in met:
+        c, k = tip_of[meeting.tip]
         first = (cracks[c].tips or ())[k] == 0
-        if own.other < 0:
+        if meeting.other < 0:
             crack = result[c]
             assert crack is not None
-            result[c] = _with_new_end(crack, first, own.x, moved[own.tip], True)
-        elif own.tip < own.other and (c, first) not in at_end:
-            other, there = tip_of[own.other]
+            result[c] = _with_new_end(crack, first, meeting.x, moved[meeting.tip], True)
+        elif meeting.tip < meeting.other and (c, first) not in at_end:
+            other, there = tip_of[meeting.other]
             last = (cracks[other].tips or ())[there] == 0
             if (other, last) in at_end:
                 continue
-            for key, row in (((c, first), own.tip), ((other, last), own.other)):
-                at_end[key] = own.x
+            for key, row in (((c, first), meeting.tip), ((other, last), meeting.other)):
+                at_end[key] = meeting.x
                 crack = result[key[0]]
                 assert crack is not None
-                result[key[0]] = _with_new_end(crack, key[1], own.x, moved[row], False)
-            pairs.append(((c, first), (other, last), own.x))
+                result[key[0]] = _with_new_end(crack, key[1], meeting.x, moved[row], False)
+            pairs.append(((c, first), (other, last), meeting.x))
     number = list(range(len(cracks)))
     for (c, _), (other, _), x in pairs:
         low, high = sorted((number[c], number[other]))
@@ -340,7 +340,7 @@ def ends_on_others(cracks: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
 def new_ends(before: Sequence[Crack], after: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
     """Ends on others that were not there before."""
     known = {tuple(x.tolist()) for _, _, x in ends_on_others(before)}
-    return [own for own in ends_on_others(after) if tuple(own[2].tolist()) not in known]
+    return [end for end in ends_on_others(after) if tuple(end[2].tolist()) not in known]
 
 
 def new_unions(

@@ -296,7 +296,7 @@ def without_inner_front(crack: Crack, number: int) -> tuple[Crack, Floats]:
     centre = crack.points[front[:-1]].mean(axis=0)
     middle = np.full(len(front) - 1, len(crack.points))
     fan = np.stack([front[:-1], front[1:], middle], axis=1)
-    fronts = tuple(own for f, own in enumerate(crack.fronts or ()) if f != number)
+    fronts = tuple(line for f, line in enumerate(crack.fronts or ()) if f != number)
     points = np.concatenate([crack.points, centre[None]])
     faces = np.concatenate([crack.faces, fan])
     return Crack(points, faces, None, fronts, crack.ends_on), centre

@@ -356,7 +356,7 @@ def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -
     if not any(crack.ends_on for crack in given):
         return cracks
     check_numbers(given)
-    result = [replace(own, ends_on=one.ends_on) for one, own in zip(given, cracks, strict=True)]
+    result = [replace(arm, ends_on=one.ends_on) for one, arm in zip(given, cracks, strict=True)]
     for c, crack in enumerate(given):
         if crack.ends_on and crack.fronts is None:
             small = _check_reach(result, c, Body.of(mesh))

@@ -190,7 +190,7 @@ def part_inside(x: Floats, inside: Ints, is_inside: Callable[[Floats], Bools]) -
     ahead = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
     on = x[[first, last]] + _ON * (x[ahead] - x[[first, last]])
     goes_on = is_inside(on)
-    first, last = (k if beyond else own for k, own, beyond in zip(ahead, (first, last), goes_on))
+    first, last = (k if beyond else end for k, end, beyond in zip(ahead, (first, last), goes_on))
     return (first, last + 1) if last > first else (0, len(x))
 
 

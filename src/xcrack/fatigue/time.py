@@ -120,13 +120,13 @@ class with_time(Constants):  # noqa: N801
             raise ProblemError("with_time: law has no units that are known: convert it by hand.")
         return super().to(units, new)
 
-    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, **wanted: ArrayLike) -> Floats:
+    def __call__(self, dK_eq: ArrayLike, R: ArrayLike, **inputs: ArrayLike) -> Floats:
         """Growth a cycle of each point, length."""
         dK, ratio = range_and_ratio("with_time", dK_eq, R)
         high = largest_K(dK, ratio)
         if not np.isfinite(high).all():
             raise ProblemError("with_time: R = 1 with a range, K_max is not known: give R < 1.")
-        by_cycle = np.asarray(self.law(dK_eq, R, **wanted))
+        by_cycle = np.asarray(self.law(dK_eq, R, **inputs))
         return np.asarray(by_cycle + self.period * self._mean_rate(high, high - dK))[()]
 
     def _mean_rate(self, high: Floats, low: Floats) -> Floats:

@@ -582,9 +582,9 @@ def enriched_stiffness(
         boundary = boundary_points(space, with_tip, lips)
     indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
     data = np.zeros((len(indices), d, d))
-    for material, own in elasticity.groups(reusable.cells):
+    for material, group in elasticity.groups(reusable.cells):
         stiffness = isotropic_part(material.unit.tensor(d))
-        for batch, _ in space.batches(own):
+        for batch, _ in space.batches(group):
             products = reusable.products[np.searchsorted(reusable.cells, batch.cells)]
             add_products(
                 data, indptr, indices, batch.functions, products, space.n_nodes, *stiffness
@@ -608,8 +608,8 @@ def enriched_stiffness(
     tasks = (
         (material, batch)
         for chunk in _chunks(space, points, others)
-        for material, own in elasticity.groups(chunk)
-        for batch, _ in space.batches(own)
+        for material, group in elasticity.groups(chunk)
+        for batch, _ in space.batches(group)
     )
     # Few points take less time than threads to begin.
     few = len(points.weight) <= _CHUNK

@@ -142,7 +142,7 @@ def finer(begun: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
     most = rule.max_unknowns or _MOST_UNKNOWNS
     tolerance = float(rule.tolerance or 0.0)
     exponent = law_exponent(rule.law, np.concatenate(step.dK_eq), np.concatenate(step.R))
-    wanted = SHARE / TOGETHER * tolerance / max(exponent, _LEAST_EXPONENT)
+    target = SHARE / TOGETHER * tolerance / max(exponent, _LEAST_EXPONENT)
     meshes = rule.meshes + 1
     for number in range(dimension.rounds):
         now = _bars_of_cracks(rule, step)
@@ -150,23 +150,23 @@ def finer(begun: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
             break
         error, unknowns = dimension.error(now), now.solutions[0].space.n_dof
         _tell(
-            rule, f"mesh {number}: {unknowns} unknowns, K within {error:.1e}, wanted {wanted:.1e}",
+            rule, f"mesh {number}: {unknowns} unknowns, K within {error:.1e}, wanted {target:.1e}",
             start,
         )  # fmt: skip
-        if error <= wanted:
+        if error <= target:
             break
-        other = _with_cells(begun, dimension.cells(rule.cells, now, wanted * now.scale), meshes)
+        other = _with_cells(begun, dimension.cells(rule.cells, now, target * now.scale), meshes)
         before, after = len(rule.problem.mesh.cells), len(other.problem.mesh.cells)
         if unknowns * after > most * before:
             warn(
                 f"grow: the mesh that tolerance = {tolerance:g} asks for would have more than "
                 f"{most} unknowns: growth goes on with {unknowns}, on which K is known to "
-                f"{error:.1e} of its largest value, where {wanted:.1e} was wanted. Allow more with "
+                f"{error:.1e} of its largest value, where {target:.1e} was wanted. Allow more with "
                 "max_unknowns; life_bar says what it costs."
             )
             return replace(rule, meshes=_MOST)
         rule = other
-        if error <= _FORETOLD * wanted or after == before:
+        if error <= _FORETOLD * target or after == before:
             break
     return replace(rule, meshes=meshes)
 
@@ -201,7 +201,7 @@ def _cells_2d(cells: CellSizes | None, now: Indicators, target: float) -> CellSi
     """Sizes at the tips and at other cells that contribute much to the bars."""
     mesh, tips = now.problem.mesh, now.problem.stations.x
     ratio = cell_ratios(now, target, _AIM)
-    centre, wanted = mesh.points[mesh.cells].mean(axis=1), ratio * mesh.cell_size
+    centre, target_size = mesh.points[mesh.cells].mean(axis=1), ratio * mesh.cell_size
     is_smaller = ratio < _SMALLER
     size = cell_sizes(mesh, tips)
     distance = np.linalg.norm(centre[:, None] - tips, axis=2)
@@ -213,10 +213,10 @@ def _cells_2d(cells: CellSizes | None, now: Indicators, target: float) -> CellSi
     is_at_tip &= ~is_at_kink[:, None] | (distance <= size)
     if cells is not None and cells.moves.any():
         size = np.minimum(size, cells.size_at(tips))
-    for k, own in enumerate((is_at_tip & is_smaller[:, None]).T):
-        size[k] = min(size[k], wanted[own].min(initial=np.inf))
+    for k, is_of_tip in enumerate((is_at_tip & is_smaller[:, None]).T):
+        size[k] = min(size[k], target_size[is_of_tip].min(initial=np.inf))
     stays = is_smaller & ~is_at_tip.any(axis=1)
-    fixed = CellSizes(centre[stays], wanted[stays], np.zeros(int(stays.sum()), dtype=bool))
+    fixed = CellSizes(centre[stays], target_size[stays], np.zeros(int(stays.sum()), dtype=bool))
     return (fixed if cells is None else cells.with_places(fixed)).with_ends(tips, size)
 
 
@@ -237,8 +237,8 @@ def _cells_3d(cells: CellSizes | None, now: Indicators, target: float) -> CellSi
     over = _error_3d(now) * now.scale / target if target > 0 else 1.0
     size = np.array(cell_sizes(mesh, stations.x))
     for crack in np.unique(stations.crack):
-        own = stations.crack == crack
-        size[own] = np.median(size[own])
+        is_of_crack = stations.crack == crack
+        size[is_of_crack] = np.median(size[is_of_crack])
     size /= np.clip(over, 1.0, _FINER**_POWER) ** (1 / _POWER)
     none = CellSizes(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
     return (none if cells is None else cells).with_ends(stations.x, size)
@@ -349,8 +349,8 @@ def _finer_at_kinks(begun: GrowthRule, rule: GrowthRule, first: Step) -> GrowthR
     if rule.meshes or rule.problem.mesh.dim == 3 or not rule.estimates or not first.n_tips:
         return None
     stations, solves = solves_of(first)
-    wanted = STEPS * float(rule.tolerance or 0.0)
-    length = first_length(LONGER_FIRST * float(solves.scale.min()), wanted, 0.0)
+    allowance = STEPS * float(rule.tolerance or 0.0)
+    length = first_length(LONGER_FIRST * float(solves.scale.min()), allowance, 0.0)
     if not first.control.least > _SHORT * length:
         return None
     sizes = np.array([cell_for(length, angle) for angle in np.concatenate(first.angle).tolist()])
@@ -431,9 +431,9 @@ def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
     largest = max((float(np.abs(angle).max(initial=0.0)) for angle in last.angle), default=0.0)
     if largest > _STRAIGHT or not np.isfinite(error.rate):
         return False
-    wanted = _MARGIN * float(rule.tolerance or 0.0)
+    allowance = _MARGIN * float(rule.tolerance or 0.0)
     rate, turn = _errors_of_step(rule, last)
-    return rate <= SHARE * wanted and turn <= (1 - PATH) * wanted
+    return rate <= SHARE * allowance and turn <= (1 - PATH) * allowance
 
 
 def _errors_of_step(rule: GrowthRule, step: Step) -> tuple[float, float]:

@@ -92,7 +92,7 @@ def advanced_cracks(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     cracks = [advance(crack, angle[r], way[r]) for crack, r in zip(step.cracks, rows, strict=True)]
     if rule.link_up is not None:
         return cracks
-    now = [own for own in meetings(cracks, mesh) if own.soon]
+    now = [meeting for meeting in meetings(cracks, mesh) if meeting.soon]
     return joined(cracks, (way > 0).tolist(), now) if now else cracks
 
 
@@ -249,9 +249,11 @@ def _followed_3d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
     for c, crack in enumerate(rates.cracks):
         new, moved = rates.sif[0][c], moved_places(last, c)
         reach = fronts.REACH * float(cell_sizes(mesh, new.x).mean() if len(new.x) else 0.0)
-        own, closed = rates.stations.crack == c, closed_fronts(crack)
+        is_of_crack, closed = rates.stations.crack == c, closed_fronts(crack)
         after.append(
-            interpolate_along_front(new.x, new.front, closed, rates.law_rate[own], moved, reach)
+            interpolate_along_front(
+                new.x, new.front, closed, rates.law_rate[is_of_crack], moved, reach
+            )
         )
         old, shut = last.sif[0][c], closed_fronts(last.cracks[c])
         near = interpolate_along_front(

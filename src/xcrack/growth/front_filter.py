@@ -214,16 +214,16 @@ def without_noise(sif: SIF, angle: Floats, closed: Floats, length: Floats) -> Fl
     """
     result = np.array(angle)
     for number in np.unique(sif.front):
-        own = np.nonzero(sif.front == number)[0]
-        K_I, noise = sif.K_I[own], sif.spread[own, 1]
-        good = np.isfinite(sif.K[own]).all() and np.isfinite(noise).all() and K_I.max() > 0
-        if len(own) < _FEWEST_OF_A_WAVE or not good or angle[own].any() == 0:
+        rows = np.nonzero(sif.front == number)[0]
+        K_I, noise = sif.K_I[rows], sif.spread[rows, 1]
+        good = np.isfinite(sif.K[rows]).all() and np.isfinite(noise).all() and K_I.max() > 0
+        if len(rows) < _FEWEST_OF_A_WAVE or not good or angle[rows].any() == 0:
             continue
-        if np.sqrt((sif.K_II[own] ** 2).mean()) > _MIXED * np.sqrt((noise**2).mean()):
+        if np.sqrt((sif.K_II[rows] ** 2).mean()) > _MIXED * np.sqrt((noise**2).mean()):
             continue
         error = 2 * noise / np.maximum(K_I, 0.3 * K_I.max())
-        result[own] = _filtered_angle(
-            sif.s[own], angle[own], error, bool(closed[number]), float(length[number])
+        result[rows] = _filtered_angle(
+            sif.s[rows], angle[rows], error, bool(closed[number]), float(length[number])
         )
     return result
 

@@ -93,8 +93,8 @@ def interpolate_along_front(
     result = np.full((len(target), *values.shape[1:]), np.nan)
     best = np.full(len(target), float(reach))
     for number in np.unique(front):
-        own = front == number
-        line, along = x[own], values[own]
+        is_of_front = front == number
+        line, along = x[is_of_front], values[is_of_front]
         if len(line) == 1:
             line, along = np.concatenate([line, line]), np.concatenate([along, along])
         shut = bool(closed[number]) and len(line) > 2
@@ -468,14 +468,15 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     first_rate = _rate(rule, solves)
     fastest = float(first_rate.max(initial=0.0))
     rate, direction = _carried_back(rule, last, rates, here)
-    cycles, own = _cycles(rule, last, rates)
+    cycles, cycle_error = _cycles(rule, last, rates)
     share = plan.length / rate.max(initial=0.0) * rate if rate.max(initial=0.0) > 0 else None
     marched = None
     if rule.retardation is not None and 0 < fastest < np.inf:
         marched = _overloads_between(rule, last, rates, here)
         rate = rate_at_end(first_rate, marched[0], plan.cycles)
         share = plan.length / fastest * rate
-        cycles, own = marched[1], share_left(rule) * beyond_trapezoid(marched[1], plan.cycles)
+        cycles = marched[1]
+        cycle_error = share_left(rule) * beyond_trapezoid(cycles, plan.cycles)
     across = cycles_of_passage(rule, last, rates)
     if across is not None:  # places stay where they are, a cell behind
         cycles, share = across, None
@@ -523,13 +524,13 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     later = _with_mean_rates(rule, after, later, remaining)
     off = share_left(rule) * float(gap.max(initial=0.0))
     control = next_control(
-        rule, last.control, plan.length, off, own, cycles, last.cycles,
+        rule, last.control, plan.length, off, cycle_error, cycles, last.cycles,
         _shortest_step(rule, after, later), np.inf,
     )  # fmt: skip
     place = _errors_at(rule, last, rates, gap)
     return Corrected(
         last.cycles + cycles, tuple(cracks), after, later,
-        StepError(place, error.cycles + own), control, remaining,
+        StepError(place, error.cycles + cycle_error), control, remaining,
     )  # fmt: skip
 
 
@@ -575,17 +576,19 @@ def _corrected_crack(
     rate = _rate(rule, solves)
     first = plan.length / rate.max() * rate
     way = 0.5 * (first + share)
-    for own, front in _waves(stations, solves, first):
-        way[own] = corrected(front, stations.s[own], first[own], share[own])
-    wanted = stations.waits + way
-    goes = wanted >= WAITS_BELOW * plan.cell
+    for is_of_front, front in _waves(stations, solves, first):
+        way[is_of_front] = corrected(
+            front, stations.s[is_of_front], first[is_of_front], share[is_of_front]
+        )
+    target = stations.waits + way
+    goes = target >= WAITS_BELOW * plan.cell
     heading = first[:, None] * solves.direction[-1] + share[:, None] * later
     along = np.einsum("ij,ij->i", heading, stations.frame[:, 0])
     across = np.einsum("ij,ij->i", heading, stations.frame[:, 1])
     ahead = _angle(stations, solves)
     angle = np.where(np.hypot(along, across) == 0, ahead, np.arctan2(across, along))
     try:
-        moved = np.where(goes, wanted, 0.0)
+        moved = np.where(goes, target, 0.0)
         crack = advanced_crack(last.corrected[c], stations, c, angle, moved, mesh)
         if crack.ends_on:
             every = [crack if k == c else other for k, other in enumerate(cracks)]
@@ -596,8 +599,8 @@ def _corrected_crack(
         return None
     if closed_fronts(again) != closed_fronts(cracks[c]):
         return None
-    gap = np.linalg.norm(plan.move - _move(stations, angle, wanted), axis=1)
-    waits, gap = np.where(goes, 0.0, wanted), np.where(goes, gap, 0.0)
+    gap = np.linalg.norm(plan.move - _move(stations, angle, target), axis=1)
+    waits, gap = np.where(goes, 0.0, target), np.where(goes, gap, 0.0)
     return again, waits[rows], gap[rows], way[rows]
 
 

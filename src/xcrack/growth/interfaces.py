@@ -155,14 +155,14 @@ def _numbers_of_sets(rule: GrowthRule) -> Ints:
 def _kinds(rule: GrowthRule) -> Ints:
     """Which of the named sets are alike in stiffness and law `(m,)`: equal numbers."""
     number, names = _numbers_of_sets(rule), [name for name, _ in rule.problem.elasticity.named]
-    own = [""] * len(names)
+    texts = [""] * len(names)
     if isinstance(rule.law, LawSets):
         laws = dict(rule.law.laws)
-        own = [str(describe("law", laws[name])) for name in names]
+        texts = [str(describe("law", laws[name])) for name in names]
     if isinstance(rule.retardation, RetardationSets):
         models = dict(rule.retardation.models)
-        own = [words + str(models[name]) for words, name in zip(own, names, strict=True)]
-    every = list(zip(number.tolist(), own, strict=True))
+        texts = [words + str(models[name]) for words, name in zip(texts, names, strict=True)]
+    every = list(zip(number.tolist(), texts, strict=True))
     return np.array([every.index(each) for each in every], dtype=np.int64)
 
 
@@ -191,18 +191,18 @@ def _hits(facets: Floats, x: Floats, ahead: Floats, most: float) -> Floats:
 def _power_of_K(elasticity: Elasticity, before: Floats, behind: Floats) -> float:
     """Power of the distance to an interface that K goes like: above 0 before a stiffer material."""
     try:
-        own, other = elasticity.isotropic_at(before), elasticity.isotropic_at(behind)
+        material, other = elasticity.isotropic_at(before), elasticity.isotropic_at(behind)
     except ProblemError:  # not isotropic
         return 0.0
-    return 0.5 - singularity_at_interface(own, other)
+    return 0.5 - singularity_at_interface(material, other)
 
 
-def singularity_at_interface(own: Isotropic, other: Isotropic) -> float:
+def singularity_at_interface(medium: Isotropic, other: Isotropic) -> float:
     """Order λ of the stresses r^-λ at a tip on an interface, which its crack meets at right angles.
 
     Parameters
     ----------
-    own, other : Isotropic
+    medium, other : Isotropic
         Materials of the crack, and ahead of it.
 
     Notes
@@ -218,9 +218,9 @@ def singularity_at_interface(own: Isotropic, other: Isotropic) -> float:
     >>> round(singularity_at_interface(steel, steel), 6)
     0.5
     """
-    alpha = (other.E_prime - own.E_prime) / (other.E_prime + own.E_prime)
-    beta = (other.mu * (own.kolosov - 1) - own.mu * (other.kolosov - 1)) / (
-        other.mu * (own.kolosov + 1) + own.mu * (other.kolosov + 1)
+    alpha = (other.E_prime - medium.E_prime) / (other.E_prime + medium.E_prime)
+    beta = (other.mu * (medium.kolosov - 1) - medium.mu * (other.kolosov - 1)) / (
+        other.mu * (medium.kolosov + 1) + medium.mu * (other.kolosov + 1)
     )
 
     def is_above(order: float) -> bool:
@@ -316,18 +316,20 @@ def _first_end(piece: Stretch, target: Floats) -> tuple[float, int]:
     return length, first
 
 
-def mixed_solves(own: SolveHistory, after: SolveHistory, sets: Ints, passed: Bools) -> SolveHistory:
+def mixed_solves(
+    before: SolveHistory, after: SolveHistory, sets: Ints, passed: Bools
+) -> SolveHistory:
     """What solves say of ends of which some have passed into another set.
 
     Parameters
     ----------
-    own, after : SolveHistory
+    before, after : SolveHistory
         Before and behind the interfaces.
     sets : (n,) array of int
         Behind.
     passed : (n,) array of bool
     """
-    kinds = own.kinds
+    kinds = before.kinds
     if kinds is not None and after.kinds is not None:
         dK, R, a = (
             np.where(passed.reshape(1, -1, *[1] * (two.ndim - 2)), two, one)
@@ -337,9 +339,9 @@ def mixed_solves(own: SolveHistory, after: SolveHistory, sets: Ints, passed: Boo
             sets = np.where(passed, sets, kinds.sets)
         kinds = BlockCycles(dK, R, a, sets)
     return replace(
-        own,
-        rate=np.where(passed, after.rate, own.rate),
-        dK_eq=np.where(passed, after.dK_eq, own.dK_eq),
+        before,
+        rate=np.where(passed, after.rate, before.rate),
+        dK_eq=np.where(passed, after.dK_eq, before.dK_eq),
         kinds=kinds,
     )
 
@@ -423,7 +425,7 @@ def rates_in_set(rule: GrowthRule, problem: Problem, response: Response, number:
         return rates_by_law_of(rule, problem, response, np.full(n, number))
 
 
-def cycles_across(size: float, way: float, behind: float, own: Floats, after: Floats) -> Floats:
+def cycles_across(size: float, way: float, behind: float, before: Floats, after: Floats) -> Floats:
     """Cycles of an end before an interface at which only laws differ, and behind it `(2,)`.
 
     Parameters
@@ -432,13 +434,13 @@ def cycles_across(size: float, way: float, behind: float, own: Floats, after: Fl
         Of the crack at first.
     way, behind : float, length
         To the interface, and from there.
-    own, after : (2,) arrays, length/cycle
+    before, after : (2,) arrays, length/cycle
         Rates at both ends of the step by the law before, and by that behind.
     """
     ends = size + np.array([0.0, way, way + behind])
     share = np.log(ends[1] / size) / np.log(ends[2] / size)
-    there = [rate[0] * (rate[1] / rate[0]) ** share for rate in (own, after)]
-    return cycles_between(ends[:2], ends[1:], [own[0], there[1]], [there[0], after[1]])
+    there = [rate[0] * (rate[1] / rate[0]) ** share for rate in (before, after)]
+    return cycles_between(ends[:2], ends[1:], [before[0], there[1]], [there[0], after[1]])
 
 
 def warn_of_passages(rule: GrowthRule, last: Step, near: InterfacesAhead, cycles: Floats) -> None:

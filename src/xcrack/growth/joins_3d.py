@@ -95,9 +95,9 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         The gap between two fronts has a shape that cannot be closed.
     """
     body = Body.of(rule.problem.mesh)
-    own = _with_ligament_broken(rule, step, plan, body)
-    if own is not None or plan.limit:
-        return own or plan
+    broken_plan = _with_ligament_broken(rule, step, plan, body)
+    if broken_plan is not None or plan.limit:
+        return broken_plan or plan
     if len(plan.cracks) < 2:
         return plan
     close = _close_pairs(plan.cracks, body, step.corrected)
@@ -640,12 +640,12 @@ def _errors(last: Step, x: Floats, mesh: Mesh) -> Floats:
     """Estimated errors of the places of a step at places close by, 0 elsewhere."""
     result = np.zeros(len(x))
     for c, crack in enumerate(last.cracks):
-        own = None if last.error is None else last.error.place[c]
+        place = None if last.error is None else last.error.place[c]
         old = last.sif[0][c]
-        if own is None or not len(old.x):
+        if place is None or not len(old.x):
             continue
         reach = _REACH * float(cell_sizes(mesh, old.x).mean())
-        near = interpolate_along_front(old.x, old.front, closed_fronts(crack), own, x, reach)
+        near = interpolate_along_front(old.x, old.front, closed_fronts(crack), place, x, reach)
         result = np.maximum(result, np.nan_to_num(near))
     return result
 

@@ -117,10 +117,10 @@ def refined_response(
         active[:] = False  # no crack has contact in any state: its gaps are lines over the factor
     ends = _ends(spectrum, low, high)
     while active.any() and len(levels) < _MOST:
-        wanted = np.nonzero(active)[0][: _MOST - len(levels)]
-        middle = [0.5 * (levels[k] + levels[k + 1]) for k in wanted]
+        numbers = np.nonzero(active)[0][: _MOST - len(levels)]
+        middle = [0.5 * (levels[k] + levels[k + 1]) for k in numbers]
         handed_on = solve_at(middle)
-        matters = _levels_that_matter(spectrum, solved, levels, wanted, middle, ends)
+        matters = _levels_that_matter(spectrum, solved, levels, numbers, middle, ends)
         bent = {m for m, off in zip(middle, matters) if off}
         levels = sorted([*levels, *middle])
         active = np.array([a in bent or b in bent for a, b in zip(levels, levels[1:])])
@@ -168,7 +168,7 @@ def _levels_that_matter(
     spectrum: Spectrum,
     solved: dict[float, LevelResponse],
     levels: Sequence[float],
-    wanted: Ints,
+    numbers: Ints,
     middle: Sequence[float],
     ends: tuple[Floats, Ints, Floats],
 ) -> Bools:
@@ -189,7 +189,7 @@ def _levels_that_matter(
         one, two = (_growths(ladder, factors, pairs, count) for ladder in (before, after))
         difference = np.abs(two - one)
         rows = []
-        for k in wanted:
+        for k in numbers:
             inside = (factors > levels[k]) & (factors < levels[k + 1])
             rows.append(difference[inside[pairs].any(axis=0)].sum(axis=0))
         off = np.concatenate([off, error], axis=1)

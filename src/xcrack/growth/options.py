@@ -327,14 +327,14 @@ def lists_options(function: AnyFunction) -> AnyFunction:
     """Let help and completion list the `GrowthOptions` that a function takes by name."""
     signature = inspect.signature(function)
     default = {each.name: each.default for each in fields(GrowthRule)}
-    own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    parameters = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
     options = [
         inspect.Parameter(
             name, inspect.Parameter.KEYWORD_ONLY, default=default[name], annotation=annotation
         )
         for name, annotation in GrowthOptions.__annotations__.items()
     ]
-    cast(Any, function).__signature__ = signature.replace(parameters=[*own, *options])
+    cast(Any, function).__signature__ = signature.replace(parameters=[*parameters, *options])
     return function
 
 

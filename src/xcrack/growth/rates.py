@@ -209,7 +209,7 @@ def rates_by_law_of(rule: GrowthRule, problem: Problem, response: Response, sets
     named = np.array([name for name, _ in problem.elasticity.named])[sets]
     names = np.split(named, np.cumsum([len(sif.x) for sif in response.sif[0]])[:-1])
     inputs = criterion_inputs(rule, problem, response, names=names)
-    return np.concatenate([own.rates_of_K(own.K).rate for own in inputs])
+    return np.concatenate([one.rates_of_K(one.K).rate for one in inputs])
 
 
 def response_without_contact(
@@ -439,7 +439,7 @@ def pairs_of(rule: GrowthRule, problem: Problem, response: Response) -> list[Ran
     if spectrum.states is not None:
         nu = [problem.elasticity.poisson_at(sif.x) for sif in response.sif[0]]
         every = [np.stack([sif.K for sif in crack]) for crack in zip(*response.sif)]
-        return [pairs_of_states(K, spectrum, own) for K, own in zip(every, nu, strict=True)]
+        return [pairs_of_states(K, spectrum, ratio) for K, ratio in zip(every, nu, strict=True)]
     values, count, _ = distinct_cycles(spectrum.cycles)
     result = []
     for ladder in ladders(problem, spectrum, response):

@@ -245,13 +245,13 @@ def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step,
         if last is None:
             with notices.watch(0) as messages:
                 first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
-                own = len(messages)
+                count = len(messages)
                 other = None
                 if not nothing_grows(rule, first):  # where nothing does, no mesh is fine enough
                     other = replanned(begun, rule, None, first)
                 if other is not None:
                     rule = other[0]
-                    del messages[:own]  # of a mesh that nobody has
+                    del messages[:count]  # of a mesh that is not used
                     first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
                 _warn_of_ratio(rule, first)
                 _warn_of_left_out(rule, first)
@@ -276,10 +276,10 @@ def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step,
                 if next_step is None:
                     break
                 is_torn = is_torn or _warn_of_mode_III(ahead, next_step)
-                own = len(messages)
+                count = len(messages)
                 other = replanned(begun, ahead, cut, next_step)
                 if other is not None:
-                    del messages[:own]  # of a step that nobody has
+                    del messages[:count]  # of a step that is not handed over
                 else:
                     if cut is not last:
                         next_step = _with_mark(next_step)

@@ -178,13 +178,13 @@ def identities_after(
     for c, crack in enumerate(cracks):
         rows = np.nonzero(crack_now == c)[0]
         points = [[tip] for tip in crack.tips or ()] if crack.fronts is None else crack.fronts
-        own = _identities_at(stations.end[rows], place[rows], [crack.points[p] for p in points])
+        ids = _identities_at(stations.end[rows], place[rows], [crack.points[p] for p in points])
         word = "tip" if crack.fronts is None else "front"
-        for k, end in enumerate(own):
+        for k, end in enumerate(ids):
             if end < 0:
-                own[k] = len(names)
+                ids[k] = len(names)
                 names.append(f"{word} {len(names)} of crack {firsts[c]}")
-        ends.append(tuple(own))
+        ends.append(tuple(ids))
     return Identities(tuple(firsts), tuple(ends), tuple(names))
 
 

@@ -161,8 +161,8 @@ def next_control(
     error = step_error(
         off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * rule.tolerance, way
     )
-    wanted = next_length(length, error, last.error, least)
-    return StepControl(_length_in_room(rule, wanted, room, least), error, least)
+    target = next_length(length, error, last.error, least)
+    return StepControl(_length_in_room(rule, target, room, least), error, least)
 
 
 def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:

@@ -155,21 +155,21 @@ def _up_to_interfaces(
     Behind it the rates are those of the law there, at the K that is known before it.
     """
     stations, solves = solves_of(step)
-    own = solves.last(2)
+    history = solves.last(2)
     goal = np.where(growth.arc > near.stop, near.goal, np.inf)
     most, row = stretch.length, int(np.argmax(growth.arc))
     crosses = np.isfinite(goal) & (goal > near.way)
-    after = own
+    after = history
     if crosses.any():
         rate = rates_behind(rule, step, near)
-        rate = np.where(crosses & (rate > 0), rate, own.rate[-1])
-        after = replace(own, rate=np.broadcast_to(rate, own.rate.shape))
+        rate = np.where(crosses & (rate > 0), rate, history.rate[-1])
+        after = replace(history, rate=np.broadcast_to(rate, history.rate.shape))
         if crosses[row]:  # da and cycles are shorter than the cells there
             most = max(most, min(float(goal[row]), step.control.length))
     done = passage(
         rule,
         stations.frame,
-        lambda passed: mixed_solves(own, after, near.after, passed),
+        lambda passed: mixed_solves(history, after, near.after, passed),
         near,
         goal,
         solves.start,
@@ -224,28 +224,28 @@ def _step_to_meeting(
     faces = last_faces(plan.cracks)
     along = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
 
-    def left(own: Meeting, length: float) -> float:
+    def left(meeting: Meeting, length: float) -> float:
         place = stations.x + _growth(stations, stretch, length).move
-        to = own.x if own.other < 0 else place[own.other]
-        return float((to - place[own.tip]) @ along[own.tip])
+        to = meeting.x if meeting.other < 0 else place[meeting.other]
+        return float((to - place[meeting.tip]) @ along[meeting.tip])
 
-    most = plan.length + max(AHEAD * own.size for own in met)
+    most = plan.length + max(AHEAD * meeting.size for meeting in met)
     if stretch.marched is not None and most > stretch.marched.sigma[-1]:
         zones, known = step.zones, stretch.solves
         stretch = stretch_of(rule, known, plan.sigma, most, zones)
-    arrival = [_arrival(partial(left, own), most) for own in met]
+    arrival = [_arrival(partial(left, meeting), most) for meeting in met]
     first = min(arrival)
-    if first == np.inf and not any(own.soon for own in met):
+    if first == np.inf and not any(meeting.soon for meeting in met):
         return plan
     length = plan.length if first == np.inf else first
     growth = _growth(stations, stretch, length)
     place = stations.x + growth.move
     apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
-    arrived = {own.tip for own, when in zip(met, arrival) if when <= length}
+    arrived = {meeting.tip for meeting, when in zip(met, arrival) if when <= length}
     now = [
-        own
-        for own in meetings(apart, rule.problem.mesh, 2 * AHEAD)
-        if own.soon or own.tip in arrived
+        meeting
+        for meeting in meetings(apart, rule.problem.mesh, 2 * AHEAD)
+        if meeting.soon or meeting.tip in arrived
     ]
     if not now:
         return plan
@@ -272,14 +272,14 @@ def _as_gap_closes(step: Step, growth: Growth, met: list[Meeting]) -> tuple[Grow
     No polynomial through solves before follows K in the last of a gap: its time is that of two
     equal cracks that face each other. The other tips come as far as they can in that.
     """
-    facing = [own for own in met if own.other >= 0]
+    facing = [meeting for meeting in met if meeting.other >= 0]
     if not facing or step.zones is not None:
         return growth, 0.0
     stations, solves = solves_of(step)
     rate, m, radius = solves.rate[-1], solves.exponent, _radii(step)
     best = growth.cycles, 0.0
-    for own in facing:
-        i, k = own.tip, own.other
+    for meeting in facing:
+        i, k = meeting.tip, meeting.other
         gap, speed = float(np.linalg.norm(stations.x[k] - stations.x[i])), float(rate[i] + rate[k])
         if speed <= 0:
             continue
@@ -289,7 +289,9 @@ def _as_gap_closes(step: Step, growth: Growth, met: list[Meeting]) -> tuple[Grow
             best = cycles, UNKNOWN[2] * (plain - cycles)
     cycles, unsure = best
     share = cycles / growth.cycles if growth.cycles > 0 else 1.0
-    meets = np.isin(np.arange(len(rate)), [row for own in facing for row in (own.tip, own.other)])
+    meets = np.isin(
+        np.arange(len(rate)), [row for meeting in facing for row in (meeting.tip, meeting.other)]
+    )
     part = np.where(meets, 1.0, share)
     return Growth(part[:, None] * growth.move, part * growth.arc, cycles), unsure
 
@@ -348,15 +350,17 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
     turns = (np.abs(angle) > START) & (rate > 0)
     if known and turns.any():
         inputs = criterion_inputs(rule, rates.problem, rates.response)
-        for c, own in enumerate(inputs):
+        for c, inputs_of_crack in enumerate(inputs):
             rows = np.nonzero(rates.stations.crack == c)[0]
             if not turns[rows].any():
                 continue
-            begins, ratio, kinked = _kink(own, turns[rows], rates, rows)
+            begins, ratio, kinked = _kink(inputs_of_crack, turns[rows], rates, rows)
             behind, dK = rate[rows], dK_eq[rows]
             if not nominal:
                 with collected_warnings([]):  # they are of cracks that nobody has
-                    answer = own.rates_of_K(clipped_K(kinked_K(clipped_K(own.K), begins)))
+                    answer = inputs_of_crack.rates_of_K(
+                        clipped_K(kinked_K(clipped_K(inputs_of_crack.K), begins))
+                    )
                 behind, dK = answer.rate, answer.dK_eq
             kinks = kinked & (behind > 0) & np.isfinite(behind)
             angle[rows] = np.where(kinks, begins, angle[rows])
@@ -387,15 +391,15 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
 
 
 def _kink(
-    own: CriterionInput, turns: Bools, rates: Rates, rows: Ints
+    inputs: CriterionInput, turns: Bools, rates: Rates, rows: Ints
 ) -> tuple[Floats, Floats, Bools]:
     """Limit angle of the kinks of a crack, T/K_I behind them, and where they are known."""
 
     def without_warning(K: Floats) -> Floats:
         with collected_warnings([]):
-            return own.angle_of_K(clipped_K(K))
+            return inputs.angle_of_K(clipped_K(K))
 
-    theta, converged = limit_angles(without_warning, clipped_K(own.K))
+    theta, converged = limit_angles(without_warning, clipped_K(inputs.K))
     kinked = turns & converged
     theta = np.where(kinked, theta, 0.0)
     opening = clipped_K(kinked_K(clipped_K(rates.K[:, rows]), theta))[..., 0]
@@ -459,7 +463,7 @@ def _stations(
     count = [crack.n_tips for crack in cracks]
     frame = [tip_frames(crack)[1] for crack in cracks]
     n = len(x)
-    ends = [end for own in identities.ends for end in own]
+    ends = [end for ends_of_crack in identities.ends for end in ends_of_crack]
     return GrowthStations(
         crack=np.repeat(np.arange(len(cracks)), count),
         front=np.concatenate([np.zeros(0, dtype=np.int64), *map(np.arange, count)]),
@@ -513,22 +517,22 @@ def _step_through_interface(
         before = rates_by_law_of(rule, rates.problem, rates.response, sets)
         here = np.where(smooth, before, here)
         there = np.where(smooth, rates_behind(rule, last, near), there)
-    own = old.with_solve(
+    history = old.with_solve(
         plan.end, here, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
     )
     after = replace(now, rate=np.stack([there, rates.law_rate]))
     if jumps.any():
-        own = replace(own, dK_eq=np.where(jumps, begin.dK_eq[0], own.dK_eq))
+        history = replace(history, dK_eq=np.where(jumps, begin.dK_eq[0], history.dK_eq))
         after = replace(after, dK_eq=np.where(jumps, rates.dK_eq, after.dK_eq))
-        own, after = _with_jumps(own, jumps, -2), _with_jumps(after, jumps, -1)
-    if own.kinds is not None and begin.kinds is not None:
-        own = replace(own, kinds=replace(own.kinds, sets=begin.kinds.sets))
+        history, after = _with_jumps(history, jumps, -2), _with_jumps(after, jumps, -1)
+    if history.kinds is not None and begin.kinds is not None:
+        history = replace(history, kinds=replace(history.kinds, sets=begin.kinds.sets))
     stands = crosses & ~(rates.rate > 0)  # nothing grows behind: the run ends there
-    after = replace(after, rate=np.where(stands, own.rate[-2:], after.rate))
+    after = replace(after, rate=np.where(stands, history.rate[-2:], after.rate))
     goal = np.where(crosses, plan.arc, np.inf)
 
     def solves_in(passed: Bools) -> SolveHistory:
-        return mixed_solves(own.last(2), after, near.after, passed) if passed.any() else own
+        return mixed_solves(history.last(2), after, near.after, passed) if passed.any() else history
 
     for most in _LONGER * plan.length:
         done = passage(
@@ -548,7 +552,7 @@ def _step_through_interface(
     if jumps[row] and last.zones is None and rates.rate[row] > 0:
         behind = float(plan.arc[row] - near.way[row])
         first, second = cycles_of_jump(
-            old, own.exponent, float(rates.law_rate[row]), row, float(near.way[row]), behind,
+            old, history.exponent, float(rates.law_rate[row]), row, float(near.way[row]), behind,
             float(near.power[row]),
         )  # fmt: skip
         cycles, cycles_at[row] = first + second, first
@@ -623,8 +627,8 @@ def _corrected_points(
     # What an end lags behind by after this step counts in all cycles that follow.
     whole = max(growth.cycles, PAST * last.cycles)
     alone = of_life.alone + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole
-    own = of_life.known + of_life.newest - error.newest_cycles
-    own += solves.exponent * behind * growth.cycles
+    cycle_error = of_life.known + of_life.newest - error.newest_cycles
+    cycle_error += solves.exponent * behind * growth.cycles
     after = _stations(cracks, identities, x, stations.fresh | moves)
     # A tip that is astray turns its next face by a share of that: where T > 0 it goes farther so.
     astray = 1 + _ASTRAY * np.maximum(gamma, 0.0)
@@ -645,7 +649,7 @@ def _corrected_points(
         solves,
         StepError(
             rates.split(place),
-            error.cycles + own,
+            error.cycles + cycle_error,
             K_place=float(astray[fastest]) * error.K_place,
             behind=behind,
             newest_place=rates.split(newest),
@@ -779,21 +783,23 @@ def _cycles(
         rest = _MENDED * share * off**2 / growth.cycles if growth.cycles > 0 else 0.0
         return growth.cycles, _CyclesError(rest, 0.0, _FIRST * share * off)
     line = stretch_of(rule, solves.last(2), plan.sigma, plan.length, last.zones).arcs()[1]
-    own = share * abs(growth.cycles - line)
+    line_error = share * abs(growth.cycles - line)
     if old.n_solves > 2:
-        return growth.cycles, _better_known(rule, last, solves, own)
+        return growth.cycles, _better_known(rule, last, solves, line_error)
     if old.sigma[0] > 0:  # the step before has passed an interface
-        return growth.cycles, _CyclesError(own, 0.0, own)
+        return growth.cycles, _CyclesError(line_error, 0.0, line_error)
     # The second step: the parabola tells what the first one, along a line, was off.
     span, first = float(old.sigma[1] - old.sigma[0]), float(old.sigma[0])
     line, curve = (
         stretch_of(rule, each, first, span, last.earlier_zones).arcs()[1] for each in (old, solves)
     )
-    both = _RATIO_OF_FIRST * (own + share * abs(curve - line))
-    return growth.cycles + curve - line, _CyclesError(_OF_SECOND * own, 0.0, both)
+    both = _RATIO_OF_FIRST * (line_error + share * abs(curve - line))
+    return growth.cycles + curve - line, _CyclesError(_OF_SECOND * line_error, 0.0, both)
 
 
-def _better_known(rule: GrowthRule, last: Step, solves: SolveHistory, own: float) -> _CyclesError:
+def _better_known(
+    rule: GrowthRule, last: Step, solves: SolveHistory, line_error: float
+) -> _CyclesError:
     """Errors of the cycles of a step behind the second.
 
     Two parabolas span the step before: that of its own, and that of the step behind it. The error
@@ -802,7 +808,7 @@ def _better_known(rule: GrowthRule, last: Step, solves: SolveHistory, own: float
     """
     old, before = solves_of(last)[1], _error(last).newest_cycles
     if last.zones is not None:
-        return _CyclesError(own, own + before, 0.0)
+        return _CyclesError(line_error, line_error + before, 0.0)
 
     def cycles(each: SolveHistory, k: int) -> float:
         begins, ends = float(old.sigma[k]), float(old.sigma[k + 1])
@@ -811,7 +817,7 @@ def _better_known(rule: GrowthRule, last: Step, solves: SolveHistory, own: float
     was = share_left(rule) * abs(cycles(old, 1) - cycles(old.last(2), 1))
     now = abs(cycles(old, 1) - cycles(solves, 1))
     longer = plan_of(last).length / float(old.sigma[2] - old.sigma[1])
-    newest = own * (float(np.clip(longer * now / was, *_RATIOS)) if was > 0 else 1.0)
+    newest = line_error * (float(np.clip(longer * now / was, *_RATIOS)) if was > 0 else 1.0)
     if old.sigma[0] == 0:  # the first step of all is spanned by one parabola: the next is prolonged
         was = abs(cycles(old, 0) - cycles(old.first(2), 0))
         prolonged = abs(cycles(old, 0) - cycles(solves, 0))
@@ -858,14 +864,14 @@ def _without_lost_tips(
     elif rest > 0:
         cycles = plan.cycles
     lost = np.concatenate(error.place)[stays]
-    own = share_left(rule) * abs(cycles - plan.cycles) + plan.error
-    own += solves.exponent * error.behind * cycles
+    cycle_error = share_left(rule) * abs(cycles - plan.cycles) + plan.error
+    cycle_error += solves.exponent * error.behind * cycles
     return Corrected(
         last.cycles + cycles,
         rates.cracks,
         stations,
         solves,
-        StepError(rates.split(lost), error.cycles + own, behind=error.behind),
+        StepError(rates.split(lost), error.cycles + cycle_error, behind=error.behind),
         _first_length(rule, stations, solves, rates),
         zones,
     )

@@ -80,7 +80,7 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
         With bars.
     """
     bar = [_stacked_K(sif, c, lambda s: s.bar) for c in range(len(rates.cracks))]
-    own = [_stacked_K(sif, c, _contact_part) for c in range(len(rates.cracks))]
+    parts = [_stacked_K(sif, c, _contact_part) for c in range(len(rates.cracks))]
     known = np.concatenate([np.isfinite(b).all(axis=(0, 2)) for b in bar])
     surface = np.concatenate([crack.at_surface for crack in sif[0]])
     rate, angle = rates.law_rate, rates.angle
@@ -92,7 +92,7 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
         for other_angle, other in both:
             change = np.maximum(change, _log_ratio(rate, other))
             turned = np.maximum(turned, np.abs(other_angle - angle))
-        share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(own, bar)])
+        share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(parts, bar)])
         total, contact, turn = total + change, contact + share * change, turn + turned
     fastest = float(rate[np.isfinite(rate)].max(initial=0.0))
     counts = (rate >= _FAST * fastest) & (rate > 0) & ~surface
@@ -231,12 +231,12 @@ def _rates_of_moved_K(
     inputs = criterion_inputs(rule, rates.problem, rates.response)
     angles, others = [], []
     with collected_warnings([]):  # they are of cracks that nobody has
-        for c, own in enumerate(inputs):
+        for c, one in enumerate(inputs):
             every = [
-                _moved_K(own.K, bar[c], mode, sign) for mode in range(n_modes) for sign in _SIGNS
+                _moved_K(one.K, bar[c], mode, sign) for mode in range(n_modes) for sign in _SIGNS
             ]
-            each = own.rates_of_K(np.concatenate(every, axis=1))
-            shape = (n_modes, len(_SIGNS), own.K.shape[1])
+            each = one.rates_of_K(np.concatenate(every, axis=1))
+            shape = (n_modes, len(_SIGNS), one.K.shape[1])
             angles.append(each.angle.reshape(shape))
             others.append(each.rate.reshape(shape))
     angle, rate = np.concatenate(angles, axis=2), np.concatenate(others, axis=2)
@@ -272,10 +272,10 @@ def _with_K(sif: SIF, bar: Floats, mode: int, sign: float) -> SIF:
 
 def _moved_K(given: Floats, bar: Floats, mode: int, sign: float) -> Floats:
     K = np.array(given)
-    own = K[..., mode]
-    changed = own + np.where(own < 0, -sign, sign) * np.nan_to_num(bar[..., mode])
+    K_of_mode = K[..., mode]
+    changed = K_of_mode + np.where(K_of_mode < 0, -sign, sign) * np.nan_to_num(bar[..., mode])
     if mode == 0:  # what is open does not overlap
-        changed = np.where(own >= 0, np.maximum(changed, 0.0), changed)
+        changed = np.where(K_of_mode >= 0, np.maximum(changed, 0.0), changed)
     K[..., mode] = changed
     return K
 

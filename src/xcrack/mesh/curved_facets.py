@@ -262,11 +262,11 @@ def raised_lattice(mesh: Mesh, facets: Ints, pairs: Ints, middles: Floats) -> La
 
 def rows_of(pairs: Ints, sought: Ints, n_points: int) -> tuple[Ints, Bools]:
     """Rows of pairs of points, smaller first, in a list of such; and which are there."""
-    key, wanted = (p[:, 0] * np.int64(n_points) + p[:, 1] for p in (pairs, sought))
+    key, sought_key = (p[:, 0] * np.int64(n_points) + p[:, 1] for p in (pairs, sought))
     order = np.argsort(key, kind="stable")
-    place = np.minimum(np.searchsorted(key[order], wanted), max(len(key) - 1, 0))
-    row = order[place] if len(key) else np.zeros(len(wanted), dtype=np.int64)
-    known = key[row] == wanted if len(key) else np.zeros(len(wanted), dtype=bool)
+    place = np.minimum(np.searchsorted(key[order], sought_key), max(len(key) - 1, 0))
+    row = order[place] if len(key) else np.zeros(len(sought_key), dtype=np.int64)
+    known = key[row] == sought_key if len(key) else np.zeros(len(sought_key), dtype=bool)
     return row, known
 
 

@@ -183,16 +183,16 @@ def _cards(path: Path) -> Iterator[Card]:
     card: Card | None = None
     size = 8  # fields of the line before
     for source, number, text in lines[begin[0] + 1 if begin else 0 :]:
-        head, own, n = _fields(text)
+        head, fields, n = _fields(text)
         if head and head[0] not in "+*":
             if card is not None:
                 yield card
-            card = Card(head.upper().rstrip("*_"), own, source, number)  # meshio writes CTETRA_
+            card = Card(head.upper().rstrip("*_"), fields, source, number)  # meshio writes CTETRA_
             if card.name == "ENDDATA":
                 break
         elif card is not None:
             card.fields.extend([""] * (-len(card.fields) % size))
-            card.fields.extend(own)
+            card.fields.extend(fields)
         size = n
     if card is not None:
         yield card
@@ -201,9 +201,9 @@ def _cards(path: Path) -> Iterator[Card]:
 def _fields(text: str) -> tuple[str, list[str], int]:
     """First field of a line, those behind it, and how many it has room for."""
     if "," in text:
-        head, *own = (each.strip() for each in text.split(","))
+        head, *fields = (each.strip() for each in text.split(","))
         n = 4 if head.endswith("*") or head.startswith("*") else 8
-        return head, own[:n], n
+        return head, fields[:n], n
     head = text[:8].strip()
     n, width = (4, 16) if "*" in head else (8, 8)
     ends = range(8, 8 + n * width, width)

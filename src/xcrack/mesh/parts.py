@@ -87,11 +87,11 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
     size = _sizes(points[facets])
     shares = _shares(points.shape[1])
     samples = [np.einsum("b,kbd->kd", share, points[facets]) for share in shares]
-    asked = sum(float(size @ is_inside(x)) for x in samples) / len(shares)
+    area = sum(float(size @ is_inside(x)) for x in samples) / len(shares)
     given = float(size[chosen].sum())
-    if abs(given - asked) > _ENDS * given:
+    if abs(given - area) > _ENDS * given:
         warn(
-            f"{what} has facets of {given:.4g} in all, where {asked:.4g} lie within what was asked "
+            f"{what} has facets of {given:.4g} in all, where {area:.4g} lie within what was asked "
             "for: its ends lie within facets. Refine the mesh there, or put points of the mesh at "
             "the ends."
         )

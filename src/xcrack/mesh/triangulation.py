@@ -90,8 +90,8 @@ def _parted_at_points(faces: Ints) -> tuple[Ints, Ints]:
             np.minimum.at(lowest := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
             part = lowest[part]
         for other in np.unique(part[:, 0])[1:]:
-            own = part[:, 0] == other
-            parted[around[own], corner[own]] = len(original)
+            is_of_part = part[:, 0] == other
+            parted[around[is_of_part], corner[is_of_part]] = len(original)
             original.append(point)
     return parted, np.array(original, dtype=np.int64)
 

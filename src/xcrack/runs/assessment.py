@@ -254,11 +254,11 @@ def _by_resistance(
     a: list[float] = []
     K: list[float] = []
     c = crack
-    for step, own in zip(steps, names, strict=True):
+    for step, name in zip(steps, names, strict=True):
         met = a and any(c in join.cracks for join in step.joins)
-        if met or names[0][crack] not in own or not step.sizes:
+        if met or names[0][crack] not in name or not step.sizes:
             break
-        c = own.index(names[0][crack])
+        c = name.index(names[0][crack])
         tips = max(len(step.angle[c]), 1) if step.cracks[c].dim == 2 else 1
         a.append(step.sizes[c] / tips)
         K.append(K_of_cracks(step, nu)[c])

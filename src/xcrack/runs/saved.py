@@ -162,8 +162,8 @@ def _history_of(arrays: Arrays, path: Path) -> History:
         raise ProblemError(f"{path} was written by a newer xcrack: update xcrack.")
 
     def part(prefix: str) -> Arrays:
-        own = (name for name in arrays if name.startswith(prefix))
-        return {name.removeprefix(prefix): arrays[name] for name in own}
+        names = (name for name in arrays if name.startswith(prefix))
+        return {name.removeprefix(prefix): arrays[name] for name in names}
 
     try:
         settings = json.loads(str(arrays["settings"]))

@@ -135,10 +135,15 @@ def pack_cracks(prefix: str, cracks: Sequence[Crack]) -> Arrays:
         f"{prefix}_point_count": _counts([c.points for c in cracks]),
         f"{prefix}_faces": _whole_numbers(np.zeros((0, d)), *(c.faces for c in cracks)),
         f"{prefix}_face_count": _counts([c.faces for c in cracks]),
-        f"{prefix}_ends": _whole_numbers(np.zeros(0), *(end for own in ends for end in own)),
-        f"{prefix}_end_length": _counts([end for own in ends for end in own]),
+        f"{prefix}_ends": _whole_numbers(
+            np.zeros(0), *(end for ends_of_crack in ends for end in ends_of_crack)
+        ),
+        f"{prefix}_end_length": _counts([end for ends_of_crack in ends for end in ends_of_crack]),
         f"{prefix}_end_count": np.array(
-            [len(own) if crack.placed else -1 for own, crack in zip(ends, cracks, strict=True)],
+            [
+                len(ends_of_crack) if crack.placed else -1
+                for ends_of_crack, crack in zip(ends, cracks, strict=True)
+            ],
             dtype=np.int64,
         ),
     }
@@ -153,15 +158,15 @@ def unpack_cracks(prefix: str, arrays: Arrays) -> tuple[Crack, ...]:
     arms = arrays.get(f"{prefix}_arms", np.zeros((0, 3), dtype=np.int64))
     result, first = [], 0
     for c, count in enumerate(arrays[f"{prefix}_end_count"].tolist()):
-        own = every[first : first + max(count, 0)]
+        rows = every[first : first + max(count, 0)]
         first += max(count, 0)
         part = slice(cut_points[c], cut_points[c + 1])
         sides = faces[cut_faces[c] : cut_faces[c + 1]]
         tips = fronts = None
         if count >= 0 and points.shape[1] == 2:
-            tips = tuple(int(end[0]) for end in own)
+            tips = tuple(int(end[0]) for end in rows)
         elif count >= 0:
-            fronts = tuple(own)
+            fronts = tuple(rows)
         ends_on = tuple((on, side) for crack, on, side in arms.tolist() if crack == c)
         result.append(Crack(points[part], sides, tips, fronts, ends_on))
     return tuple(result)
@@ -252,17 +257,19 @@ def _unpack_sif(arrays: Arrays, n_cracks: int) -> tuple[tuple[SIF, ...], ...]:
     for k in range(len(arrays["K"])):
         row = []
         for c in range(n_cracks):
-            own = crack == c
-            values = {n: lock(arrays[n][own]) for n in _OF_PLACES}
-            values |= {n: lock(arrays[n][k][own]) for n in _OF_STATES}
+            is_of_crack = crack == c
+            values = {n: lock(arrays[n][is_of_crack]) for n in _OF_PLACES}
+            values |= {n: lock(arrays[n][k][is_of_crack]) for n in _OF_STATES}
             if "widened" in arrays and arrays["has_widened"][k, c]:
-                values["widened"] = lock(arrays["widened"][k][own])
+                values["widened"] = lock(arrays["widened"][k][is_of_crack])
             if "E_prime" in arrays and arrays["has_moduli"][k, c]:
-                values |= {n: lock(arrays[n][k][own]) for n in ("E_prime", "nu")}
+                values |= {n: lock(arrays[n][k][is_of_crack]) for n in ("E_prime", "nu")}
             errors = None
             if "bar" in arrays and arrays["has_bar"][k, c]:
-                eta, bar, contact = (lock(arrays[n][k][own]) for n in ("eta", "bar", "contact_bar"))
-                reasons = tuple(arrays["bar_reason"][k][own].tolist())
+                eta, bar, contact = (
+                    lock(arrays[n][k][is_of_crack]) for n in ("eta", "bar", "contact_bar")
+                )
+                reasons = tuple(arrays["bar_reason"][k][is_of_crack].tolist())
                 has_part = arrays["has_contact_bar"][k, c]
                 errors = KErrors(eta, bar, reasons, contact if has_part else None)
             ends = tuple(
@@ -408,7 +415,7 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
         ends = split(arrays["identity_end"], arrays["identity_end_count"].tolist())
         identities = Identities(
             tuple(arrays["identity_crack"].tolist()),
-            tuple(tuple(int(end) for end in own) for own in ends),
+            tuple(tuple(int(end) for end in ends_of_crack) for ends_of_crack in ends),
             tuple(arrays["identity_name"].tolist()),
         )
     run = None

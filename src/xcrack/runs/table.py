@@ -37,10 +37,10 @@ class Table(np.ndarray[Any, Any]):
 
     def __getitem__(self, key: Any) -> Any:
         names = self.dtype.names
-        asked = [key] if isinstance(key, str) else key if isinstance(key, list) else []
-        if names is None or not all(isinstance(name, str) for name in asked):
-            asked = []
-        columns = [self._by_number(name) for name in asked]
+        keys = [key] if isinstance(key, str) else key if isinstance(key, list) else []
+        if names is None or not all(isinstance(name, str) for name in keys):
+            keys = []
+        columns = [self._by_number(name) for name in keys]
         for name in columns:
             if name not in (names or ()):
                 listed = ", ".join(names or ())

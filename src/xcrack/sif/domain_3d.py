@@ -206,7 +206,7 @@ def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool
         return False, False
     space = solution.space
     tip = space.tips[t]
-    wanted = _wanted_radius(solution, t)
+    radius = _wanted_radius(solution, t)
     x, frame, _ = curve.at(np.array([0.0, curve.length]))
     others = [
         np.array(one.x) for one in space.tips if one.crack == tip.crack and one.number != tip.number
@@ -216,7 +216,7 @@ def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool
         beyond = np.concatenate([*others, x[[1 - e]]]) - x[e]
         away = np.linalg.norm(beyond, axis=1)
         ahead = sign * (beyond @ frame[e, 2])
-        close = (away < _BESIDE * wanted) & (ahead >= _AHEAD * away)
+        close = (away < _BESIDE * radius) & (ahead >= _AHEAD * away)
         result.append(bool(close.any()))
     return result[0], result[1]
 
@@ -323,9 +323,9 @@ def front_values(
     space, tip_material = solutions[0].space, materials.references[0]
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
-    wanted = _wanted_radius(solutions[0], t)
+    target_radius = _wanted_radius(solutions[0], t)
     knots = front_nodes(curve, _spacing(curve, ends, size), ends)
-    sides = sides_around(solutions, tip.crack, curve, wanted)
+    sides = sides_around(solutions, tip.crack, curve, target_radius)
     room = _room(solutions[0], t, curve, knots, size)
     beside = np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
     smooth = np.zeros(len(knots), dtype=bool)
@@ -333,7 +333,7 @@ def front_values(
         smooth = on_smooth_planes(sides, curve, knots)
     valid = beside > _LEAST * size
     room = np.where(valid, np.minimum(room, beside), room)
-    radius = np.clip(room, _LEAST * size, wanted)
+    radius = np.clip(room, _LEAST * size, target_radius)
     radii = radius[:, None] * np.array([1.0, SECOND])
     outer = float(radius.max())
     distance = curve.distance(space.mesh.points, outer)
@@ -351,7 +351,7 @@ def front_values(
     bend_at = int(np.argmin(bend))
     domain = Domain(
         outer_radius=float(radius.min()),
-        free_radius=wanted,
+        free_radius=target_radius,
         room=float(room[least]),
         least_room=_NARROW * size,
         is_short=False,
@@ -464,15 +464,20 @@ def _domain_parts(
             )  # fmt: skip
         total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
         for material, rows, ratio in materials.parts(feet.s):
-            own, of_feet = gradient[rows], feet.chosen(rows)
+            local_gradient, of_feet = gradient[rows], feet.chosen(rows)
             cell, bary = points.cell[rows], points.bary[rows]
-            change, rise, turned = elasticity.stress_change(material, own, cell, bary), None, turn
+            change, rise, turned = (
+                elasticity.stress_change(material, local_gradient, cell, bary),
+                None,
+                turn,
+            )
             if ratio is not None:
-                change -= (ratio[0] - 1)[:, None, None, None] * _stresses(material, own)
-                own = ratio[0][:, None, None, None] * (own - turn)
+                change -= (ratio[0] - 1)[:, None, None, None] * _stresses(material, local_gradient)
+                local_gradient = ratio[0][:, None, None, None] * (local_gradient - turn)
                 rise, turned = ratio[1] / of_feet.turn[:, 3], np.zeros_like(turn)
             total += domain_integrals(
-                curve, knots, of_feet, points.weight[rows], own - turned, side[rows], behind[rows],
+                curve, knots, of_feet, points.weight[rows], local_gradient - turned, side[rows],
+                behind[rows],
                 material, radii, force=None if force is None else force[rows], initial=initial,
                 stress_change=change, rise=rise,
             )  # fmt: skip
@@ -541,12 +546,12 @@ def _lip_part(
     total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     initial = initial_stresses(solutions)
     for material, rows, ratio in materials.parts(feet.s):
-        own = None if gradient is None else gradient[:, rows]
-        if own is not None and ratio is not None:
-            own = own * ratio[0][None, :, None, None, None]
+        local_gradient = None if gradient is None else gradient[:, rows]
+        if local_gradient is not None and ratio is not None:
+            local_gradient = local_gradient * ratio[0][None, :, None, None, None]
         total += lip_integrals(
             curve, knots, feet.chosen(rows), normal[rows], weight[rows], traction[rows], material,
-            radii, gradient=own, initial=initial,
+            radii, gradient=local_gradient, initial=initial,
         )  # fmt: skip
     return total
 

@@ -308,7 +308,11 @@ def _least_at_tip(solution: Solution, crack: int, domain: Domain) -> tuple[float
         domain.room / _ROOM: f"the next boundary, crack or tip is {domain.room / size:.1f} cells "
         f"away, and bars hold from {_ROOM:g} on: refine the mesh there",
     }
-    return min(what), size, next((text for wanted, text in what.items() if wanted < size), "")
+    return (
+        min(what),
+        size,
+        next((text for length_needed, text in what.items() if length_needed < size), ""),
+    )
 
 
 def _bars(
@@ -626,10 +630,10 @@ def finer_along(problem: Problem, crack: int) -> Mesh:
     is_near = front.query(centre)[0] <= _NEAR_FRONT * mesh.cell_size
     each = np.where(is_near, mesh.cell_size / FINER, np.inf)
 
-    def wanted(x: Floats) -> Floats:
+    def size_at(x: Floats) -> Floats:
         return np.asarray(each[mesh.cell_tree.query(x)[1]])
 
-    return refine(mesh, size=wanted)
+    return refine(mesh, size=size_at)
 
 
 _Estimate = Callable[[Sequence[Solution], Sequence[SIF], int], list[KErrors]]
@@ -708,11 +712,11 @@ def _places_of_finer_cells(solutions: Sequence[Solution]) -> Places | None:
         return along_faces(solution) if is_whole or not rubs else None
     pairs = []
     for t, tip in enumerate(space.tips):
-        wanted, size, _ = _least_at_tip(solution, tip.crack, domain_of(solution, t))
-        pairs.append((tip.x, wanted, size))
+        target, size, _ = _least_at_tip(solution, tip.crack, domain_of(solution, t))
+        pairs.append((tip.x, target, size))
     for c in cracks:
         pairs += [(x, room / least, size) for x, room, least, size in _short_parts(solution, c)]
-    few = [(x, max(wanted / _MARGIN, size / _FINEST)) for x, wanted, size in pairs if wanted < size]
+    few = [(x, max(target / _MARGIN, size / _FINEST)) for x, target, size in pairs if target < size]
     if not few:
         return None
     return Places(np.array([x for x, _ in few]), np.array([size for _, size in few]))

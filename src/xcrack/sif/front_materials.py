@@ -147,16 +147,16 @@ def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) 
         [_parameter_between(number_at, s[k], s[k + 1], int(number[k])) for k in rows]
     )
     _refuse_interface(solution, curve, s, number, changes, size)
-    own = number[np.append(rows, len(s) - 1)]
+    numbers = number[np.append(rows, len(s) - 1)]
     if period is None:
         breaks = np.concatenate([ends[:1], changes, ends[1:]])
     elif len(changes):
         breaks = np.append(changes, changes[0] + curve.length)
-        own = own[1:]
+        numbers = numbers[1:]
     else:
         breaks = ends
     references, logarithms = [], []
-    for k, (begin, end) in zip(own.tolist(), zip(breaks, breaks[1:]), strict=True):
+    for k, (begin, end) in zip(numbers.tolist(), zip(breaks, breaks[1:]), strict=True):
         reference, logarithm = _reference(elasticity, curve, k, float(begin), float(end))
         references.append(reference)
         logarithms.append(logarithm)

@@ -446,8 +446,8 @@ def twice_as_wide(
             return reading(knots[tops], np.ones(len(tops), dtype=bool), curve, s)
         return reading(knots, np.isin(np.arange(len(knots)), tops), curve, s)
 
-    own = None if zero is None else zero[tops]
-    K = _K_of_integrals(share @ _moments(curve, knots, spline), I @ share.T, tip_material, own)
+    values = None if zero is None else zero[tops]
+    K = _K_of_integrals(share @ _moments(curve, knots, spline), I @ share.T, tip_material, values)
     result[:, :, rows] = np.einsum("sv,nkvm->nksm", spline(knots[rows]), K)
     return result
 

@@ -173,7 +173,7 @@ class Bimaterial:
         exponent = -0.5 - 1j * self.epsilon
         log_z = np.log(r) + 1j * theta
         z, conjugate = np.exp(log_z), np.exp(np.conj(log_z))
-        own, other = np.where(above, a_1, a_2), np.where(above, a_2, a_1)
+        a, other = np.where(above, a_1, a_2), np.where(above, a_2, a_1)
         kolosov, mu = (
             np.where(above, *(getattr(m, name) for m in self.materials))
             for name in ("kolosov", "mu")
@@ -188,8 +188,8 @@ class Bimaterial:
                 F.append((exponent - k) * F[k] / z)
                 F_bar.append((exponent - k) * F_bar[k] / conjugate)
             for n, result in ((0, gradients), (1, bends)):
-                Phi, Omega = F[n] / own, F_bar[n] / other
-                bent = (z - conjugate) * np.conj(F[n + 1] / own)
+                Phi, Omega = F[n] / a, F_bar[n] / other
+                bent = (z - conjugate) * np.conj(F[n + 1] / a)
                 along = (kolosov * Phi - Omega - bent) / (2 * mu)
                 across = 1j * (kolosov * Phi + Omega - 2 * np.conj(Phi) + bent) / (2 * mu)
                 result[mode, :, 0, 0], result[mode, :, 1, 0] = along.real, along.imag

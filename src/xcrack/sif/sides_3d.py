@@ -159,12 +159,14 @@ def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> Floats:
     for support in dict.fromkeys([*solutions[0].problem.supports, *loads]):
         if not isinstance(support.where, str):
             continue
-        own = np.isin(facet, numbers_of(mesh, facet_set(mesh, support.where, support.name)))
-        if own.any():
-            middle = mesh.points[mesh.facets[facet[own]]].mean(axis=1)
+        is_of_set = np.isin(facet, numbers_of(mesh, facet_set(mesh, support.where, support.name)))
+        if is_of_set.any():
+            middle = mesh.points[mesh.facets[facet[is_of_set]]].mean(axis=1)
             fixed = ~np.isnan(support.displacement_at(middle))
             # What is not the same everywhere along a side makes it no plane of symmetry.
-            axes[own] = np.maximum(axes[own], fixed if support.holds or support.is_uniform else 1.0)
+            axes[is_of_set] = np.maximum(
+                axes[is_of_set], fixed if support.holds or support.is_uniform else 1.0
+            )
     return axes
 
 
@@ -268,12 +270,12 @@ def _integrals(
         )  # fmt: skip
     total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     for material, rows, ratio in materials.parts(feet.s):
-        own = None if gradient is None else gradient[rows]
-        if own is not None and ratio is not None:
-            own = own * ratio[0][:, None, None, None]
+        local_gradient = None if gradient is None else gradient[rows]
+        if local_gradient is not None and ratio is not None:
+            local_gradient = local_gradient * ratio[0][:, None, None, None]
         total += side_integrals(
             curve, knots, feet.chosen(rows), normal[rows], points.weight[rows], traction[rows],
-            side[rows], behind[rows], material, radii, gradient=own, initial=initial,
+            side[rows], behind[rows], material, radii, gradient=local_gradient, initial=initial,
         )  # fmt: skip
     return total
 

@@ -396,10 +396,10 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
 
 
 @kernel
-def _cut(ranked, centre, cells, low, high, last, seen, begins):  # type: ignore[no-untyped-def]
+def _cut(ranked, centre, cells, low, high, last, visit, begins):  # type: ignore[no-untyped-def]
     """Axis and place of a cut near the middle of some cells, with the fewest points on it.
 
-    `last` is the last cell of each point, `seen` the latest look at it and, at its end, how many
+    `last` is the last cell of each point, `visit` the latest look at it and, at its end, how many
     looks there were, `begins` the number of points that come with each cell.
     """
     half, widest = low + (high - low) // 2, 0.0
@@ -410,14 +410,14 @@ def _cut(ranked, centre, cells, low, high, last, seen, begins):  # type: ignore[
     for i in range(len(ranked)):
         if centre[ranked[i, high - 1], i] - centre[ranked[i, low], i] < 0.5 * widest:
             continue
-        seen[-1] += 1
+        visit[-1] += 1
         for k in range(low, high):
             begins[k] = 0
             for j in range(cells.shape[1]):
                 point = cells[ranked[i, k], j]
                 last[point] = k
-                if seen[point] != seen[-1]:
-                    seen[point] = seen[-1]
+                if visit[point] != visit[-1]:
+                    visit[point] = visit[-1]
                     begins[k] += 1
         points = 0  # that have cells on both sides of the cut behind cell k
         for k in range(low, half + slack):
@@ -452,7 +452,7 @@ def bisect_cells(ranked, centre, cells, n_points, depth):  # type: ignore[no-unt
         Number 0 to 2^depth - 1.
     """
     d, n = ranked.shape
-    last, seen = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
+    last, visit = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
     begins = np.empty(n, dtype=np.int64)
     leaf = np.empty(n, dtype=np.int64)
     low, high = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
@@ -466,7 +466,7 @@ def bisect_cells(ranked, centre, cells, n_points, depth):  # type: ignore[no-unt
             a, b = low[g], high[g]
             half, axis = a + (b - a) // 2, 0
             if b - a > 1:
-                axis, half = _cut(ranked, centre, cells, a, b, last, seen, begins)
+                axis, half = _cut(ranked, centre, cells, a, b, last, visit, begins)
             new_low[2 * g], new_high[2 * g] = a, half
             new_low[2 * g + 1], new_high[2 * g + 1] = half, b
             if b - a < 2:

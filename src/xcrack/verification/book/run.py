@@ -39,8 +39,8 @@ class CaseRow:
     def passed(self) -> bool:
         """Whether every error is within its tolerance, and the rate is what it has to be."""
         within = all(value.error <= value.tolerance for value in self.values)  # nan fails
-        wanted = self.values[0].rate
-        return within and (wanted is None or math.isnan(self.rate) or self.rate >= wanted)
+        rate = self.values[0].rate
+        return within and (rate is None or math.isnan(self.rate) or self.rate >= rate)
 
 
 @dataclass(frozen=True)

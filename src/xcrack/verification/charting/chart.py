@@ -144,8 +144,8 @@ def chart(
     runs = _Runs(problem, named, states, quantity, progress)
     every = _meshes(runs, meshes, repeat, seconds)
     outcomes = _timed(runs, every, repeat)
-    own = None if quantity is None else partial(_of_user, quantity)
-    others = adapted_runs(problem, aims, states, own, repeat, runs.say)
+    user_quantity = None if quantity is None else partial(_of_user, quantity)
+    others = adapted_runs(problem, aims, states, user_quantity, repeat, runs.say)
     result = _compared(runs, every, outcomes, others, wanted, repeat)
     if file is not None:
         result.plot(file)
@@ -195,11 +195,11 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
             result = solve(scene, runs.states)
             solutions: list[Solution] = [result] if runs.states is None else result
             if runs.quantity is None:
-                own = K_of_all(solutions) if runs.has_tips else _energies(solutions)
+                values = K_of_all(solutions) if runs.has_tips else _energies(solutions)
         except (XcrackError, np.linalg.LinAlgError, MemoryError) as error:
             return _failed(changes, scene, error)
         try:  # of the user's function no exception but ours is a run that failed
-            sample = own if runs.quantity is None else _of_user(runs.quantity, result)
+            sample = values if runs.quantity is None else _of_user(runs.quantity, result)
         except XcrackError as error:
             return _failed(changes, scene, error)
         seconds = perf_counter() - start

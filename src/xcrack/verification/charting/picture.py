@@ -41,8 +41,8 @@ def _axes(chart: Chart, axes: Any) -> None:
     axes.axhspan(bottom, floor, color="0.9", lw=0, zorder=0)
     names = list(dict.fromkeys(row.setting for row in chart.rows))
     for number, name in enumerate(names):
-        own = [r for r in chart.good if r.setting == name]
-        _setting(chart, axes, own, _color(chart, name, number))
+        rows = [r for r in chart.good if r.setting == name]
+        _setting(chart, axes, rows, _color(chart, name, number))
     front = chart.pareto
     axes.plot(
         [row.seconds for row in front],
@@ -79,8 +79,8 @@ def _axes(chart: Chart, axes: Any) -> None:
 
 def _color(chart: Chart, name: str, number: int) -> str:
     """Of a setting; black for runs that make their meshes themselves."""
-    own = any(row.mesh < 0 for row in chart.rows if row.setting == name)
-    return "black" if own else f"C{number % 10}"
+    is_of_user = any(row.mesh < 0 for row in chart.rows if row.setting == name)
+    return "black" if is_of_user else f"C{number % 10}"
 
 
 def _setting(chart: Chart, axes: Any, rows: list[ChartRow], color: str) -> None:

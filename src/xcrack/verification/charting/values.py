@@ -109,8 +109,8 @@ def at_places(sample: Sampled, places: Sampled) -> Floats:
                 "the reference: return as many whatever mesh and setting are."
             )
         return sample.values.ravel()
-    asked = places.group if places.group is not None else sample.group
-    here, there = (np.unique(group, axis=0) for group in (sample.group, asked))
+    group_of_places = places.group if places.group is not None else sample.group
+    here, there = (np.unique(group, axis=0) for group in (sample.group, group_of_places))
     if not np.array_equal(here, there):
         raise ProblemError(
             f"{len(here)} tip(s) or front(s) here, {len(there)} in the reference: another crack. "
@@ -120,8 +120,8 @@ def at_places(sample: Sampled, places: Sampled) -> Floats:
     inner = inner if inner.any() else np.ones_like(inner)
     result = np.zeros((int(inner.sum()), sample.values.shape[1]))
     # By crack, not by front: fronts of one crack may be numbered otherwise in another mesh.
-    for c in np.unique(asked[:, 0]):
-        mine = asked[inner, 0] == c
+    for c in np.unique(group_of_places[:, 0]):
+        mine = group_of_places[inner, 0] == c
         result[mine] = _nearest(sample, int(c), places.points[inner][mine])
     return result.ravel()
 
@@ -213,9 +213,9 @@ def most_trusted(
     finest = max((mesh for mesh, s in values if s not in outside), default=-1)
     claims = []
     for mesh, setting in values:
-        own = sorted(m for m, s in values if s == setting)
-        if mesh == finest and len(own) > 1 and setting not in outside:
-            left = remaining([values[m, setting] for m in own], [sizes[m] for m in own])
+        meshes = sorted(m for m, s in values if s == setting)
+        if mesh == finest and len(meshes) > 1 and setting not in outside:
+            left = remaining([values[m, setting] for m in meshes], [sizes[m] for m in meshes])
             claims.append((left, setting))
     if not claims:
         raise ProblemError(

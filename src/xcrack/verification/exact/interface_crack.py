@@ -79,11 +79,11 @@ def displacement(
     left, right = logarithm(z + a, above), logarithm(z - a, above)
     power = np.exp((-0.5 - 1j * epsilon) * right + (-0.5 + 1j * epsilon) * left)
     slope = scale * ((z - 2j * epsilon * a) * power - 1)
-    own, other = np.where(above, a_1, a_2), np.where(above, a_2, a_1)
+    near, other = np.where(above, a_1, a_2), np.where(above, a_2, a_1)
     k = np.where(above, kolosov(upper[1], plane), kolosov(lower[1], plane))
     mu = np.where(above, shear_modulus(*upper), shear_modulus(*lower))
-    phi, omega = integral(z, above) / own, integral(np.conj(z), ~above) / other
-    u = (k * phi - omega - (z - np.conj(z)) * np.conj(slope / own)) / (2 * mu)
+    phi, omega = integral(z, above) / near, integral(np.conj(z), ~above) / other
+    u = (k * phi - omega - (z - np.conj(z)) * np.conj(slope / near)) / (2 * mu)
     return np.stack([u.real, u.imag], axis=1)
 
 

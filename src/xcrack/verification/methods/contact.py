@@ -376,9 +376,9 @@ class nitsche(Springs):  # noqa: N801
         """The stiffness less that of the stresses, on rows of stress and gap."""
         c = rows.measure / rows.eps
         R = sp.csr_matrix(rows.stress + sp.diags(rows.eps) @ rows.jump)
-        own = sp.csr_matrix(rows.stress @ engine.basis)
+        stress = sp.csr_matrix(rows.stress @ engine.basis)
         K = sp.csr_matrix(engine.matrix - rows.stress.T @ sp.diags(c) @ rows.stress)
-        reduced = sp.csc_matrix(engine.basis_matrix - own.T @ sp.diags(c) @ own)
+        reduced = sp.csc_matrix(engine.basis_matrix - stress.T @ sp.diags(c) @ stress)
         return ClosedSystem(engine, K, R, c, reduced)
 
     def solution(
@@ -468,7 +468,7 @@ def _newton(system: ClosedSystem, f: Floats, known: Floats, r: Floats, start: Bo
     """Sets of closed rows until one stays; where one comes back, steps are cut by a line search."""
     K, R, c, basis = system.stiffness, system.rows, system.c, system.engine.basis
     active, u = np.array(start, dtype=bool), None
-    seen: set[bytes] = set()
+    visited_sets: set[bytes] = set()
     for sets in range(1, _MAX_SETS + 1):
         part = R[active]
         loads = f - K @ known - part.T @ (c[active] * (r[active] + part @ known))
@@ -481,11 +481,11 @@ def _newton(system: ClosedSystem, f: Floats, known: Floats, r: Floats, start: Bo
         floor = 1e-13 * float(np.abs(gap).max(initial=0.0))
         if ((gap < -floor) == active).all():
             return _State(new, gap, active, sets)
-        if active.tobytes() in seen and u is not None:
+        if active.tobytes() in visited_sets and u is not None:
             t = _step(system, f, r, u, new - u)
             new = u + t * (new - u)
             gap = np.asarray(R @ new + r)
-        seen.add(active.tobytes())
+        visited_sets.add(active.tobytes())
         u, active = new, gap < -floor
     raise ConvergenceError(
         f"contact: after {sets} sets of {len(c)} places the set of closed ones still changes. Give "

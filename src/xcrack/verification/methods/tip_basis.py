@@ -73,8 +73,8 @@ def mode_columns(
     used = np.array(free)
     for tip in space.tips:
         points = np.nonzero(tip.point_to_function >= 0)[0]
-        own = tip.point_to_function[points][:, None] + np.arange(tip.functions)
-        unknown = own[:, :, None] * d + np.arange(d)
+        functions = tip.point_to_function[points][:, None] + np.arange(tip.functions)
+        unknown = functions[:, :, None] * d + np.arange(d)
         plain[unknown] = used[unknown] = False
         whole = free[unknown].all(axis=(1, 2))
         points, unknown = points[whole], unknown[whole]

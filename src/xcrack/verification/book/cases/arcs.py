@@ -32,11 +32,11 @@ def _open(level: int, order: int, degrees: float, stress: tuple[float, float]) -
         contact="off",
     )
     sif = stress_intensity(solve(problem))
-    wanted = np.array([arc.K_lower, arc.K_upper]) * [[1, -1], [1, 1]]
-    scale = float(np.abs(wanted).max())
+    reference = np.array([arc.K_lower, arc.K_upper]) * [[1, -1], [1, 1]]
+    scale = float(np.abs(reference).max())
     within = {1: 1e-2, 2: 5e-3}[order]
     return [
-        Value(f"K_{'I' * (m + 1)} at tip {k}", sif.K[k, m], wanted[k, m], within, scale)
+        Value(f"K_{'I' * (m + 1)} at tip {k}", sif.K[k, m], reference[k, m], within, scale)
         for k in (0, 1)
         for m in (0, 1)
     ]

@@ -48,11 +48,11 @@ def _ring(level: int, order: int) -> list[Value]:
     solution = solve(problem)
     contact = solution.contact[0]
     assert contact is not None
-    wanted = p * (1 + _INNER**2 / (contact.points**2).sum(axis=1))
+    reference = p * (1 + _INNER**2 / (contact.points**2).sum(axis=1))
     error = energy_error(solution, lambda x: field(x)[1])
-    worst = float(np.abs(contact.pressure / wanted - 1).max())
+    worst = float(np.abs(contact.pressure / reference - 1).max())
     return [
-        Value("error of the pressure, L2", l2(contact.pressure, wanted, contact.measure), 0.0,
+        Value("error of the pressure, L2", l2(contact.pressure, reference, contact.measure), 0.0,
               0.1, 1.0, rate=0.9),
         Value("largest error of the pressure", worst, 0.0, 0.25, 1.0),
         Value("error in energy", error, 0.0, {1: 0.15, 2: 0.02}[order], 1.0, rate=0.9 * order),

@@ -71,10 +71,10 @@ def _openings(level: int) -> list[Value]:
         solution = solve(Problem(mesh, steel, [crack], loads=loads))
         line = float(crack_opening(solution, (0.0, 0.0))) * steel.E_prime
         face = float(crack_opening(solution)[0]) * steel.E_prime
-        wanted = _gauge(x, 2.1630, 12.219, -20.065, -0.9925, 20.609, -9.9314)
-        values.append(Value(f"load line, a/W = {x:g}", line, wanted, 0.01))
-        wanted = _gauge(x, 1.6137, 12.678, -14.231, -16.610, 35.050, -14.494) * (1 + 0.25 / x)
-        values.append(Value(f"front face, a/W = {x:g}", face, wanted, 0.01))
+        reference = _gauge(x, 2.1630, 12.219, -20.065, -0.9925, 20.609, -9.9314)
+        values.append(Value(f"load line, a/W = {x:g}", line, reference, 0.01))
+        reference = _gauge(x, 1.6137, 12.678, -14.231, -16.610, 35.050, -14.494) * (1 + 0.25 / x)
+        values.append(Value(f"front face, a/W = {x:g}", face, reference, 0.01))
     return values
 
 

@@ -25,11 +25,11 @@ def _open(level: int, h: float, b: float | None, order: int, **shape: Any) -> li
     a = 0.5 if b is None else 0.6
     problem, Q = flat_crack(h / 2**level, _MIXED, a=a, b=b, order=order, contact="off", **shape)
     sif = stress_intensity(solve(problem))
-    wanted = exact_K(sif, Q, _MIXED, a=a, b=b)
-    error, size = sif.K - wanted, np.abs(wanted).max(axis=0)
+    reference = exact_K(sif, Q, _MIXED, a=a, b=b)
+    error, size = sif.K - reference, np.abs(reference).max(axis=0)
     mean, worst = {1: (2e-2, 5e-2), 2: (2e-2, 5e-2)}[order]
     values = [
-        Value("mean of K_I", float(sif.K_I.mean()), float(wanted[:, 0].mean()), mean),
+        Value("mean of K_I", float(sif.K_I.mean()), float(reference[:, 0].mean()), mean),
     ]
     for m, mode in enumerate(("I", "II", "III")):
         values.append(
@@ -44,15 +44,17 @@ def _closed(level: int) -> list[Value]:
     solution = solve(problem)
     sif, contact = stress_intensity(solution), solution.contact[0]
     assert contact is not None
-    wanted = exact_K(sif, Q, _CLOSED)
-    size = float(np.abs(wanted[:, 1:]).max())
+    reference = exact_K(sif, Q, _CLOSED)
+    size = float(np.abs(reference[:, 1:]).max())
     mean = float(contact.measure @ contact.pressure / contact.measure.sum())
     return [
         Value("mean pressure", mean, 1.0, 1e-2),
         Value("largest K_I", float(np.abs(sif.K_I).max()), 0.0, 1e-9, size),
         *(
-            Value(f"mean error of K_{mode}", float(np.abs(sif.K - wanted)[:, m].mean()), 0.0, 5e-2,
-                  size)
+            Value(
+                f"mean error of K_{mode}", float(np.abs(sif.K - reference)[:, m].mean()), 0.0,
+                5e-2, size,
+            )
             for m, mode in ((1, "II"), (2, "III"))
         ),
     ]  # fmt: skip

@@ -35,9 +35,9 @@ def _scene(
 def _values(sif: SIF, within: float, unit: float = 1.0, rate: float | None = None) -> list[Value]:
     # The normal is the same at both tips: K_II changes its sign.
     return [
-        Value(f"K_{mode} at tip {tip}", sif.K[tip, m] / _ROOT / unit, wanted, within, 1.0, rate)
+        Value(f"K_{mode} at tip {tip}", sif.K[tip, m] / _ROOT / unit, reference, within, 1.0, rate)
         for m, (mode, pair) in enumerate((("I", (_SYY, _SYY)), ("II", (-_SXY, _SXY))))
-        for tip, wanted in enumerate(pair)
+        for tip, reference in enumerate(pair)
     ]
 
 
@@ -80,10 +80,10 @@ def _direction_run(level: int, order: int) -> list[Value]:
     problem, _ = _scene(level, order)
     sif = stress_intensity(solve(problem))
     angle, _, _ = max_hoop_stress(np.stack([np.zeros_like(sif.K), sif.K]), NU)
-    wanted = kinks.hoop_angle(np.full(2, _SYY), np.array([-_SXY, _SXY]))
+    reference = kinks.hoop_angle(np.full(2, _SYY), np.array([-_SXY, _SXY]))
     degree = np.pi / 180
     return [
-        Value(f"angle at tip {k}, degrees", angle[k] / degree, float(wanted[k]) / degree,
+        Value(f"angle at tip {k}, degrees", angle[k] / degree, float(reference[k]) / degree,
               {1: 1.0, 2: 0.05}[order], 1.0)
         for k in (0, 1)
     ]  # fmt: skip

@@ -31,10 +31,10 @@ def _run(level: int, both: bool) -> list[Value]:
         loads=[traction("top", (0.0, 1.0)), traction("bottom", (0.0, -1.0))],
     )
     solution = solve(problem)
-    wanted = BOWIE[1.0][0 if both else 1]
+    reference = BOWIE[1.0][0 if both else 1]
     return [
         Value(f"K_I / s √(π a), crack {c}", stress_intensity(solution, c).K_I[0] / np.sqrt(np.pi),
-              wanted, 5e-3)
+              reference, 5e-3)
         for c in range(len(cracks))
     ]  # fmt: skip
 

@@ -64,8 +64,8 @@ def _open(level: int, name: str) -> list[Value]:
 def _pressed(level: int) -> list[Value]:
     slid = np.abs(_K_at_tips("T", PRESSED, "on", level)[:, 1])
     return [
-        Value(f"K_II, tip {k}", float(own), wanted, 0.01)
-        for k, (own, wanted) in enumerate(zip(slid, K_PRESSED, strict=True))
+        Value(f"K_II, tip {k}", float(slip), reference, 0.01)
+        for k, (slip, reference) in enumerate(zip(slid, K_PRESSED, strict=True))
     ]
 
 
@@ -93,8 +93,10 @@ def _slice(level: int) -> list[Value]:
     for c in (0, 1):
         sif = stress_intensity(solution, c)
         for f in np.unique(sif.front):
-            own = sif.front == f
-            rows.append((sif.x[own, 0].mean(), *np.abs(sif.K[own, :2]).mean(axis=0)))
+            is_of_front = sif.front == f
+            rows.append(
+                (sif.x[is_of_front, 0].mean(), *np.abs(sif.K[is_of_front, :2]).mean(axis=0))
+            )
     K_space = np.array([row[1:] for row in sorted(rows[:2]) + rows[2:]])
     wrong = np.abs(K_space - np.abs(K["T"])).max(axis=1) / np.linalg.norm(K["T"], axis=1)
     return [Value(f"error of K, front {k}", float(e), 0.0, 2e-3, 1.0) for k, e in enumerate(wrong)]

@@ -54,11 +54,11 @@ def _life(level: int, order: int, law: Law, cycle: Cycle, effective: float) -> l
     """Cycles of the row by a law that sees a share of the range; exact for m = 2."""
     cells = {1: 31, 2: 15}[order] * 2**level
     a, N = _grown(row_of_cracks(cells, order), law, cycle, 4 * 2**level)
-    wanted = lives.paris_life_periodic(_A0, a, _W, _C, effective)
+    reference = lives.paris_life_periodic(_A0, a, _W, _C, effective)
     return [
         Value("half length", a, _A0 + _GROWTH, 1e-3),
         # No rate: what steps of second order leave is below the error of the first step's rates.
-        Value("cycles", N, wanted, {1: 2e-2, 2: 2e-3}[order]),
+        Value("cycles", N, reference, {1: 2e-2, 2: 2e-3}[order]),
     ]
 
 
@@ -66,8 +66,8 @@ def _power(level: int, order: int) -> list[Value]:
     """The same with m = 3, by quadrature."""
     law = paris(_C, 3.0)
     a, N = _grown(row_of_cracks({1: 31, 2: 15}[order] * 2**level, order), law, _CYCLE, 4 * 2**level)
-    wanted = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
-    return [Value("cycles", N, wanted, {1: 4e-2, 2: 2e-3}[order])]
+    reference = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
+    return [Value("cycles", N, reference, {1: 4e-2, 2: 2e-3}[order])]
 
 
 def _to_a_tolerance(level: int) -> list[Value]:
@@ -78,11 +78,11 @@ def _to_a_tolerance(level: int) -> list[Value]:
     )  # fmt: skip
     history = collect(run, until=_has_grown, keep_solutions=False)
     a = float(np.ptp(history.cracks[0].points[:, 0])) / 2
-    wanted = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
+    reference = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
     bar = history.life_bar
     return [
-        Value("cycles", history.life, wanted, tolerance),
-        Value("error over its bar", abs(history.life - wanted) / bar.total, 0.0, 1.0, scale=1.0),
+        Value("cycles", history.life, reference, tolerance),
+        Value("error over its bar", abs(history.life - reference) / bar.total, 0.0, 1.0, scale=1.0),
         Value("bar over the cycles", bar.relative, 0.0, tolerance, scale=1.0),
     ]
 
@@ -104,16 +104,16 @@ def _rule(level: int) -> list[Value]:
     """Ten steps of the cycle rule: exact for powers of the length, of second order else."""
     values = []
     for m in (2.0, 3.3):
-        wanted = lives.paris_life(1.0, 3.0, _C, m, 1.0)
+        reference = lives.paris_life(1.0, 3.0, _C, m, 1.0)
         N = _by_rule(partial(_power_rate, m), 10)
-        values.append(Value(f"cycles, power law m = {m:g}", N, wanted, 1e-9))
+        values.append(Value(f"cycles, power law m = {m:g}", N, reference, 1e-9))
 
     def rate(a: Any) -> Any:
         return _C * (8.0 * np.tan(np.pi * a / 8.0)) ** 1.5
 
-    wanted = quad(lambda a: 1 / rate(a), 1.0, 3.0, epsrel=1e-12)[0]
+    reference = quad(lambda a: 1 / rate(a), 1.0, 3.0, epsrel=1e-12)[0]
     N = _by_rule(rate, 10 * 2**level)
-    values.append(Value("cycles, finite width", N, wanted, 5e-3, rate=1.9))
+    values.append(Value("cycles, finite width", N, reference, 5e-3, rate=1.9))
     return values
 
 

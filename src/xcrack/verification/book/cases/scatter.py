@@ -63,13 +63,13 @@ def _spectrum(level: int) -> list[Value]:
     """Blocks by m = 2, and by m = 3 on the same path."""
     history = _run(level, flights=True)
     a = _end(history)
-    wanted = paris_life_periodic(_A0, a, _W, _C, 1.0) / float((_RANGES**2).sum())
+    reference = paris_life_periodic(_A0, a, _W, _C, 1.0) / float((_RANGES**2).sum())
     steps = np.linspace(_A0, a, 4001)
     rate = _C * (_RANGES**3).sum() * np.array([periodic_K(x, _W) for x in steps]) ** 3
     cubed = float(((1 / rate[1:] + 1 / rate[:-1]) / 2 * np.diff(steps)).sum())
     other = history.rerate(paris(_C, 3.0), _LAW, spectrum=_FLIGHT, criterion=weighted_angle, nu=0.3)
     return [
-        Value("blocks", history.life, wanted, 2e-3),
+        Value("blocks", history.life, reference, 2e-3),
         Value("blocks by another law", other.life, cubed, 1e-2, rate=0.9),
     ]
 
@@ -109,8 +109,8 @@ def _strength(level: int) -> list[Value]:
     values = []
     for n in (0, len(rows) - 1):
         half = _A0 + _GROWTH * n / (len(rows) - 1)
-        wanted = 2.5 / float(periodic_K(half, _W))
-        values.append(Value(f"factor at a = {half:.3g}", rows["by_toughness"][n], wanted, 2e-3))
+        reference = 2.5 / float(periodic_K(half, _W))
+        values.append(Value(f"factor at a = {half:.3g}", rows["by_toughness"][n], reference, 2e-3))
     return values
 
 

@@ -43,16 +43,16 @@ def _blocks(level: int, order: int) -> list[Value]:
     rows = [(0.0, 1.0, 2.0), (0.1, 0.7, 15.0), (0.2, 0.5, 100.0)]
     a, N = _grown(level, order, paris(_C, 2.0), Spectrum(rows=rows), None)
     total = sum(count * (high - low) ** 2 for low, high, count in rows)
-    wanted = lives.paris_life_periodic(_A0, a, _W, _C, float(np.sqrt(total)))
-    return [Value("blocks", N, wanted, {1: 2e-2, 2: 3e-3}[order])]
+    reference = lives.paris_life_periodic(_A0, a, _W, _C, float(np.sqrt(total)))
+    return [Value("blocks", N, reference, {1: 2e-2, 2: 3e-3}[order])]
 
 
 def _overloads(level: int, order: int, model: Retardation) -> list[Value]:
     """An overload and small cycles; the sum cycle by cycle over K of the row."""
     spectrum = Spectrum([0.0, _OVER, *[0.0, _SMALL] * _N])
     a, N = _grown(level, order, paris(_C, 3.0), spectrum, model)
-    wanted = _by_hand(model, a)
-    return [Value("blocks", N, wanted, {1: 4e-2, 2: 3e-3}[order])]
+    reference = _by_hand(model, a)
+    return [Value("blocks", N, reference, {1: 4e-2, 2: 3e-3}[order])]
 
 
 def _by_hand(model: Retardation, last: float) -> float:
@@ -60,11 +60,11 @@ def _by_hand(model: Retardation, last: float) -> float:
     a, end, size, K_over, count = _A0, 0.0, 0.0, 0.0, 0
     while a < last:
         K = (_SMALL if count % (_N + 1) else _OVER) * math.sqrt(_W * math.tan(math.pi * a / _W))
-        own = K**2 / (2 * math.pi * _YIELD**2)
-        if a + own >= end:
-            end, size, K_over = a + own, own, K
+        zone = K**2 / (2 * math.pi * _YIELD**2)
+        if a + zone >= end:
+            end, size, K_over = a + zone, zone, K
         if isinstance(model, wheeler):
-            grows = _C * K**3 * min((own / (end - a)) ** model.w, 1.0)
+            grows = _C * K**3 * min((zone / (end - a)) ** model.w, 1.0)
         else:
             lost = (K_over * math.sqrt((end - a) / size) - K) / (model.shutoff - 1)
             grows = _C * (K - min(max(lost, 0.0), K)) ** 3
