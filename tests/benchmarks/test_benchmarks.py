@@ -24,7 +24,7 @@ from xcrack.fem.williams import mode_matrix, tip_values, unit_gradients
 from xcrack.verification.exact import plates
 
 ROOT = Path(__file__).resolve().parents[2]
-WITHIN = 1.2  # of the least time: two runs of one case on a busy machine differ by as much
+WITHIN = 1.3  # of the least time: two runs of one case beside other tests differ by as much
 
 
 def test_every_script_finds_what_it_imports():
