@@ -448,11 +448,6 @@ class Argument:
     is_optional: bool
     annotation: Any
 
-    @property
-    def is_required(self) -> bool:
-        """Whether it must be given."""
-        return self.default is inspect.Parameter.empty
-
     def unit_of(self, owner: Any) -> Dimension | None:
         """Dimension of its numbers in an object; None where it holds none."""
         unit = None if self.rule is None else self.rule.unit

@@ -66,14 +66,7 @@ def draw(
         plotter.enable_anti_aliasing("ssaa")
         _add_body(pv, plotter, picture, cmap, (width, height))
         _add_lines(pv, plotter, picture, edges, 1e-4 * float(size.max()))
-        if title:
-            plotter.add_text(
-                title,
-                position=(MARGIN / width, 1 - 50 / height),
-                viewport=True,
-                font_size=font_size(26),
-                color="black",
-            )
+        _add_title(plotter, title, (width, height))
         plotter.view_xy()
         camera = plotter.camera
         camera.parallel_projection = True
@@ -85,6 +78,19 @@ def draw(
         camera.parallel_scale = height / 2 / scale
         camera.clipping_range = (0.5 * far_distance, 1.5 * far_distance)
         return show_or_save(plotter, file, show)
+
+
+def _add_title(plotter: Any, title: str | None, window: tuple[int, int]) -> None:
+    """A title, if there is one, at the top left of a window of a width and height."""
+    if title:
+        width, height = window
+        plotter.add_text(
+            title,
+            position=(MARGIN / width, 1 - 50 / height),
+            viewport=True,
+            font_size=font_size(26),
+            color="black",
+        )
 
 
 def _add_body(pv: Any, plotter: Any, picture: Scene, cmap: str, window: tuple[int, int]) -> None:
@@ -275,14 +281,7 @@ def draw_space(
         if arrows is not None:
             _add_arrows(pv, plotter, arrows)
         _add_legend(plotter, picture, (width, height))
-        if title:
-            plotter.add_text(
-                title,
-                position=(MARGIN / width, 1 - 50 / height),
-                viewport=True,
-                font_size=font_size(26),
-                color="black",
-            )
+        _add_title(plotter, title, (width, height))
         camera = plotter.camera
         camera.parallel_projection = True
         # The body fills the window but for the bar on the right and the title above.
