@@ -193,7 +193,7 @@ def _answer_of(
     parts = []
     for name, part in zip(("angle", "dK_eq", "R"), answer):
         try:
-            values = numbers(part, name, finite=False)
+            values = numbers(part, name, must_be_finite=False)
         except ProblemError as error:
             wrong.append(str(error))
             return None
@@ -227,7 +227,7 @@ def _call_law(
     if name is None:
         return answer
     try:
-        return numbers(answer, name, finite=False)
+        return numbers(answer, name, must_be_finite=False)
     except ProblemError as error:
         wrong.append(str(error))
         return None

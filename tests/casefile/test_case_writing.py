@@ -247,7 +247,7 @@ def test_growth_ends_where_cracks_are_on_named_sets(tmp_path):
     """The edge crack is on the left side from the first step on, and never on the right one."""
     file = strip_case(tmp_path, 'until = "left"\n')
     case = xc.read_case(file)
-    history = growth_of_case(case, tmp_path / "run", resumed=False, progress=False)
+    history = growth_of_case(case, tmp_path / "run", is_resumed=False, progress=False)
     assert len(history.steps) == 1
     assert history.ended == "cracks are on left at step 0"
     steps = xc.grow(case.problem, **case.growth)

@@ -125,7 +125,7 @@ def test_another_scene_is_no_reference():
         (m, s): np.array([1.0 + s + 0.1 * (1 - s) * 0.5**m]) for m in range(2) for s in (0, 1)
     }
     assert most_trusted(values, [1.0, 0.5])[0] == (1, 1)
-    assert most_trusted(values, [1.0, 0.5], outside=[1]) == ((1, 0), pytest.approx(0.05))
+    assert most_trusted(values, [1.0, 0.5], left_out=[1]) == ((1, 0), pytest.approx(0.05))
 
 
 def circle(n, start, front=0):

@@ -89,7 +89,7 @@ def test_distances_from_a_polyline_are_those_to_its_nearest_place():
     path = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
     points = np.array([[0.5, 0.2], [1.3, 0.5], [-0.3, -0.4], [1.0, 1.0], [0.9, 0.1]])
     np.testing.assert_allclose(distances(points, path), [0.2, 0.3, 0.5, 0.0, 0.1], atol=1e-15)
-    both = path_comparisons(points, path, within=(0.3, 0.4))
+    both = path_comparisons(points, path, limits=(0.3, 0.4))
     assert both[0].predicted == pytest.approx(np.sqrt((0.04 + 0.09 + 0.25 + 0.01) / 5), rel=1e-14)
     assert [each.passed for each in both] == [True, False]
 

@@ -51,7 +51,7 @@ def test_a_cycle_is_repeated_until_slip_returns():
     assert effective.tolist() == pytest.approx([0.0, tau - mu, mu, tau - mu])
     cycle = states[2:]
     once = xc.solve(problem, cycle)
-    again = solve_states(problem, cycle, reuse=SolverState(), repeated=True)
+    again = solve_states(problem, cycle, reuse=SolverState(), is_repeated=True)
     K = np.stack([x.K for x in xc.stress_intensities(again)])[:, 1, 1]
     assert K == pytest.approx(effective[2:] * np.sqrt(np.pi), abs=1e-3)
     assert once[0].dissipated == 0
@@ -75,7 +75,7 @@ def slips_of(problem, before):
     from xcrack.analysis.multipliers import multipliers
 
     lips = model.lips[0]
-    m = multipliers(model.space, 0, lips, "reduced", model.known.is_fixed, rubs=True)
+    m = multipliers(model.space, 0, lips, "reduced", model.known.is_fixed, has_friction=True)
     rows = tangential_rows(model.space, m, lips)[0]
     return (
         weak_slip(model, m, tangents(lips), before)[0],

@@ -79,7 +79,7 @@ def test_an_array():
     np.testing.assert_array_equal(numbers([], "x", (0,)), [])
     np.testing.assert_array_equal(numbers(range(3), "x"), [0, 1, 2])
     np.testing.assert_array_equal(whole_numbers([1.0, 2.0], "x", (2,)), [1, 2])
-    assert np.isnan(numbers([np.nan], "x", finite=False)).all()
+    assert np.isnan(numbers([np.nan], "x", must_be_finite=False)).all()
     unmasked = np.ma.array([1.0, 2.0])
     np.testing.assert_array_equal(numbers(unmasked, "x"), [1, 2])
 

@@ -106,8 +106,8 @@ def solve_contact(
     f: Floats,
     u_imposed: Floats,
     reuse: SolverState,
-    acting: Sequence[LoadState],
-    repeated: bool = False,
+    load_states: Sequence[LoadState],
+    is_repeated: bool = False,
 ) -> ContactSolution:
     """Solve, and give multipliers to cracks whose faces overlap, until none does.
 
@@ -124,46 +124,50 @@ def solve_contact(
         Loads, and displacements that supports impose.
     reuse : SolverState
         Of an earlier step.
-    acting : sequence of LoadState
+    load_states : sequence of LoadState
         Loads of each state: some methods need what acts on the faces besides.
-    repeated : bool
+    is_repeated : bool
         With friction: the states are a cycle, repeated until slip returns.
     """
     n = len(model.lips)
     spaces: list[Multipliers | None] = [None] * n
     pressure: list[Floats | None] = [None] * n
-    active: list[Bools | None] = [None] * n
-    expected: list[int] = []
+    closed_sets: list[Bools | None] = [None] * n
+    expected_cracks: list[int] = []
     trials: dict[int, Multipliers] = {}
     sets, dual = 0, None
-    rubbed: FrictionSolution | None = None
+    friction_solution: FrictionSolution | None = None
     chosen: list[Multipliers] = []
     if problem.contact == "off":
         u: Floats | None = engine.solve(f, u_imposed)
-        pending: list[int] = []
+        pending_cracks: list[int] = []
     else:
         # A factorisation needs no look at open faces where all cracks get multipliers anyway.
-        sure = problem.contact == "on" and isinstance(engine, DirectSystem)
-        closed = [c for c in range(n) if len(model.lips[c]) and (sure or reuse.was_closed(c))]
-        u, exact = engine.first_look(f, u_imposed, bool(closed))
+        is_certain = problem.contact == "on" and isinstance(engine, DirectSystem)
+        closed_cracks = [
+            c for c in range(n) if len(model.lips[c]) and (is_certain or reuse.was_closed(c))
+        ]
+        u, is_exact = engine.first_look(f, u_imposed, bool(closed_cracks))
         if u is None:
-            pending = expected = closed
+            pending_cracks = expected_cracks = closed_cracks
         else:
-            pending = _overlapping_cracks(problem, model, u, spaces, trials)
-            if not pending and not exact:
+            pending_cracks = _overlapping_cracks(problem, model, u, spaces, trials)
+            if not pending_cracks and not is_exact:
                 u = engine.solve(f, u_imposed, u)
-                pending = _overlapping_cracks(problem, model, u, spaces, trials)
-    opened = u
-    while pending:
-        for c in pending:
+                pending_cracks = _overlapping_cracks(problem, model, u, spaces, trials)
+    u_opened = u
+    while pending_cracks:
+        for c in pending_cracks:
             spaces[c] = _space(problem, model, c, trials)
         chosen = [m for m in spaces if m is not None]
         if any(has_friction(problem, m.crack) for m in chosen):
-            rubbed = _solve_friction(problem, model, engine, chosen, f, u_imposed, reuse, repeated)
-            states = rubbed.states
+            friction_solution = _solve_friction(
+                problem, model, engine, chosen, f, u_imposed, reuse, is_repeated
+            )
+            states = friction_solution.states
         else:
             states = _solve_states(
-                problem, model, engine, chosen, f, u_imposed, (u, opened), reuse, acting
+                problem, model, engine, chosen, f, u_imposed, (u, u_opened), reuse, load_states
             )
         u = np.stack([cast(Floats, state.u) for state in states], axis=1)
         sets, dual = max(state.sets for state in states), states[0].dual
@@ -171,26 +175,34 @@ def solve_contact(
         for m in chosen:
             last = first + len(m.measure)
             pressure[m.crack] = np.stack([s.pressure[first:last] for s in states], axis=1)
-            active[m.crack] = np.stack([s.active[first:last] for s in states])
+            closed_sets[m.crack] = np.stack([s.active[first:last] for s in states])
             first = last
-        displacements = u if rubbed is None else np.concatenate([u, rubbed.between], axis=1)
-        pending = _overlapping_cracks(problem, model, displacements, spaces, trials)
-    assert u is not None  # of the first look, or of the loop that it made begin
-    if rubbed is not None:
-        parts = tuple(spaces), tuple(pressure), tuple(active)
-        return ContactSolution(
-            u, *parts, sets, rubbing=tuple(rubbed.rubbing), dissipated=rubbed.dissipated
+        displacements = (
+            u
+            if friction_solution is None
+            else np.concatenate([u, friction_solution.between], axis=1)
         )
-    for c in expected:
-        ever = active[c]
-        if ever is not None and not ever.any() and problem.contact != "on":
-            spaces[c] = pressure[c] = active[c] = None
-    if dual is not None and expected:
-        stays = np.repeat(
+        pending_cracks = _overlapping_cracks(problem, model, displacements, spaces, trials)
+    assert u is not None  # of the first look, or of the loop that it made begin
+    if friction_solution is not None:
+        parts = tuple(spaces), tuple(pressure), tuple(closed_sets)
+        return ContactSolution(
+            u,
+            *parts,
+            sets,
+            rubbing=tuple(friction_solution.rubbing),
+            dissipated=friction_solution.dissipated,
+        )
+    for c in expected_cracks:
+        closed_groups = closed_sets[c]
+        if closed_groups is not None and not closed_groups.any() and problem.contact != "on":
+            spaces[c] = pressure[c] = closed_sets[c] = None
+    if dual is not None and expected_cracks:
+        is_retained = np.repeat(
             [spaces[m.crack] is not None for m in chosen], [len(m.measure) for m in chosen]
         )
-        dual = dual[np.ix_(stays, stays)]
-    return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(active), sets, dual)
+        dual = dual[np.ix_(is_retained, is_retained)]
+    return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(closed_sets), sets, dual)
 
 
 def _solve_friction(
@@ -201,21 +213,31 @@ def _solve_friction(
     f: Floats,
     u_imposed: Floats,
     reuse: SolverState,
-    repeated: bool,
+    is_repeated: bool,
 ) -> FrictionSolution:
     """The load path of all states; substeps count where a crack has no multipliers yet."""
-    closed = problem.numerics.initial_set == "closed"
-    having = {m.crack for m in chosen}
-    others = any(len(lips) and c not in having for c, lips in enumerate(model.lips))
-    start, size = _start(chosen, reuse, 0, closed), _face_size(model, chosen)
+    is_closed_first = problem.numerics.initial_set == "closed"
+    cracks_with_contact = {m.crack for m in chosen}
+    others = any(len(lips) and c not in cracks_with_contact for c, lips in enumerate(model.lips))
+    start, size = _start(chosen, reuse, 0, is_closed_first), _face_size(model, chosen)
     stiffness = problem.elasticity.largest_modulus / size
-    before = reuse.slip if repeated else None
+    earlier_slip = reuse.slip if is_repeated else None
     springs = None
     method = problem.numerics.contact_method
     if method is not None:
         springs = [method.compliance(problem, model, m) for m in chosen]
     return solve_friction(
-        problem, model, engine, chosen, f, u_imposed, start, stiffness, others, before, springs
+        problem,
+        model,
+        engine,
+        chosen,
+        f,
+        u_imposed,
+        start,
+        stiffness,
+        others,
+        earlier_slip,
+        springs,
     )
 
 
@@ -228,24 +250,24 @@ def _solve_states(
     u_imposed: Floats,
     guess: tuple[Floats | None, Floats | None],
     reuse: SolverState,
-    acting: Sequence[LoadState],
+    load_states: Sequence[LoadState],
 ) -> list[StateContact]:
     """Contact of all load states; `guess` is the latest u and that of open faces."""
-    closed = problem.numerics.initial_set == "closed"
-    start = [_start(chosen, reuse, k, closed) for k in range(f.shape[1])]
+    is_closed_first = problem.numerics.initial_set == "closed"
+    start = [_start(chosen, reuse, k, is_closed_first) for k in range(f.shape[1])]
     method = problem.numerics.contact_method
     if method is not None:
         return cast(
             list[StateContact],
             method.solve_states(
-                problem, model, engine, chosen, f, u_imposed, start, closed, acting
+                problem, model, engine, chosen, f, u_imposed, start, is_closed_first, load_states
             ),
         )
     rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
     N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
     measure = np.concatenate([m.measure for m in chosen])
     stiffness = problem.elasticity.largest_modulus / _face_size(model, chosen)
-    conditions = ContactRows(N, measure, stiffness, closed)
+    conditions = ContactRows(N, measure, stiffness, is_closed_first)
     return engine.contact(conditions, f, u_imposed, start, *guess)
 
 
@@ -260,12 +282,12 @@ def _overlapping_cracks(
 
     The multipliers that say so are kept in `trials`, by crack.
     """
-    needing = []
+    cracks_in_need = []
     for c, lips in enumerate(model.lips):
         if spaces[c] is not None or not len(lips):
             continue
         if problem.contact == "on":
-            needing.append(c)
+            cracks_in_need.append(c)
             continue
         gap = times(model.jumps[c], u)
         limit = -_OVERLAP * np.abs(u[: model.space.n_nodes * model.space.dim]).max(axis=0)
@@ -277,11 +299,11 @@ def _overlapping_cracks(
                 material=material_numbers(problem),
             )  # fmt: skip
         trial = trials[c]
-        weighted = times_transposed(trial.values, lips.weight[:, None] * gap)
-        weak = weighted / trial.measure[:, None]
-        if (weak.min(axis=0) < limit).any():
-            needing.append(c)
-    return needing
+        weighted_gap = times_transposed(trial.values, lips.weight[:, None] * gap)
+        weak_gap = weighted_gap / trial.measure[:, None]
+        if (weak_gap.min(axis=0) < limit).any():
+            cracks_in_need.append(c)
+    return cracks_in_need
 
 
 def _space(
@@ -292,10 +314,12 @@ def _space(
     if method is not None:
         return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
-    fixed, rub = model.known.is_fixed, has_friction(problem, c)
+    is_fixed, rub = model.known.is_fixed, has_friction(problem, c)
     if c in trials and not rub:
         return trials[c]
-    return multipliers(model.space, c, model.lips[c], kind, fixed, rub, material_numbers(problem))
+    return multipliers(
+        model.space, c, model.lips[c], kind, is_fixed, rub, material_numbers(problem)
+    )
 
 
 def material_numbers(problem: Problem) -> Ints | None:
@@ -304,14 +328,14 @@ def material_numbers(problem: Problem) -> Ints | None:
     return number if len(number) else None
 
 
-def _start(chosen: list[Multipliers], reuse: SolverState, k: int, closed: bool) -> Bools | None:
+def _start(chosen: list[Multipliers], reuse: SolverState, k: int, is_closed: bool) -> Bools | None:
     """Closed set that state k starts from; None where no step came before."""
     if not reuse.centre:
         return None
     parts = []
     for m in chosen:
-        before = reuse.start(m.crack, m.centre, k)
-        parts.append(np.full(len(m.measure), closed) if before is None else before)
+        earlier_set = reuse.start(m.crack, m.centre, k)
+        parts.append(np.full(len(m.measure), is_closed) if earlier_set is None else earlier_set)
     return np.concatenate(parts)
 
 
@@ -325,16 +349,16 @@ def contact_of(
 ) -> tuple[Contact | None, ...]:
     """Contact of each crack in state k, None where it has no multipliers."""
     result: list[Contact | None] = []
-    rubbing = {each.crack: each for each in solution.rubbing}
+    work_of_crack = {each.crack: each for each in solution.rubbing}
     for c, lips in enumerate(model.lips):
-        m, pressure, active = solution.spaces[c], solution.pressure[c], solution.active[c]
-        if m is None or pressure is None or active is None:
+        m, pressure, is_active = solution.spaces[c], solution.pressure[c], solution.active[c]
+        if m is None or pressure is None or is_active is None:
             result.append(None)
             continue
-        closed = np.asarray(m.values @ active[k].astype(float)) >= 0.5
+        is_closed = np.asarray(m.values @ is_active[k].astype(float)) >= 0.5
         contact_fields: dict[str, Any] = {}
-        if c in rubbing:
-            contact_fields = _friction_fields(m, rubbing[c], u, k)
+        if c in work_of_crack:
+            contact_fields = _friction_fields(m, work_of_crack[c], u, k)
         result.append(
             Contact(
                 lips.x,
@@ -342,7 +366,7 @@ def contact_of(
                 lips.weight,
                 lock(np.asarray(m.values @ pressure[:, k])),
                 lock(np.asarray(model.jumps[c] @ u)),
-                lock(closed),
+                lock(is_closed),
                 lips.s,
                 **contact_fields,
             )
@@ -350,15 +374,15 @@ def contact_of(
     return tuple(result)
 
 
-def _friction_fields(m: Multipliers, rubbing: FrictionWork, u: Floats, k: int) -> dict[str, Any]:
+def _friction_fields(m: Multipliers, work: FrictionWork, u: Floats, k: int) -> dict[str, Any]:
     """What friction adds to the contact of one crack in state k."""
-    stuck = np.asarray(m.values @ rubbing.stuck[k].astype(float)) >= 0.5
-    shear = np.stack([m.values @ tractions[:, k] for tractions in rubbing.shear], axis=1)
-    slip = np.stack([jump @ u for jump in rubbing.jumps], axis=1)
-    one = (slice(None), 0) if len(rubbing.jumps) == 1 else ()
+    is_stuck = np.asarray(m.values @ work.stuck[k].astype(float)) >= 0.5
+    shear = np.stack([m.values @ tractions[:, k] for tractions in work.shear], axis=1)
+    slip = np.stack([jump @ u for jump in work.jumps], axis=1)
+    one = (slice(None), 0) if len(work.jumps) == 1 else ()
     return {
-        "tangent": lock(rubbing.tangents[one]),
+        "tangent": lock(work.tangents[one]),
         "shear": lock(np.ascontiguousarray(shear[one])),
         "slip": lock(np.ascontiguousarray(slip[one])),
-        "stuck": lock(stuck),
+        "stuck": lock(is_stuck),
     }

@@ -59,24 +59,26 @@ _OTHER = 0.1  # distance over the length of a crack from which on it is another 
 
 
 def slip_of(
-    model: System, rubbing: tuple[FrictionWork, ...], u: Floats
+    model: System, works: tuple[FrictionWork, ...], u: Floats
 ) -> tuple[SlipField | None, ...]:
     """Slip of all cracks in one state, None where nothing rubs.
 
     Parameters
     ----------
     model : System
-    rubbing : tuple of FrictionWork
+    works : tuple of FrictionWork
     u : (n_dof,) array, length
     """
     result: list[SlipField | None] = [None] * len(model.lips)
-    for each in rubbing:
-        along = np.stack([jump @ u for jump in each.jumps], axis=1)
-        result[each.crack] = _LEFT[model.space.dim](model, each, along)
+    for each in works:
+        slip = np.stack([jump @ u for jump in each.jumps], axis=1)
+        result[each.crack] = _LEFT[model.space.dim](model, each, slip)
     return tuple(result)
 
 
-def weak_slip(model: System, m: Multipliers, tangents: Floats, before: SlipField | None) -> Floats:
+def weak_slip(
+    model: System, m: Multipliers, tangents: Floats, earlier_slip: SlipField | None
+) -> Floats:
     """Integrals of each function times the slip that was left `(d - 1, g)`.
 
     Parameters
@@ -84,44 +86,46 @@ def weak_slip(model: System, m: Multipliers, tangents: Floats, before: SlipField
     model : System
     m : Multipliers
     tangents : (q, d - 1, d) array
-    before : SlipField or None
+    earlier_slip : SlipField or None
         None where nothing was left.
     """
     lips = model.lips[m.crack]
     slip = np.zeros((len(lips), tangents.shape[1]))
-    if before is not None and len(before.slip):
-        slip = _AGAIN[model.space.dim](model, m.crack, tangents, before)
+    if earlier_slip is not None and len(earlier_slip.slip):
+        slip = _AGAIN[model.space.dim](model, m.crack, tangents, earlier_slip)
     return np.asarray((m.values.T @ (lips.weight[:, None] * slip)).T)
 
 
-def _left_2d(model: System, rubbing: FrictionWork, along: Floats) -> SlipField:
-    points = model.space.cracks[rubbing.crack].points
-    place = _places(points, model.lips[rubbing.crack])
-    return SlipField(points, lock(place), lock(along[:, 0]))
+def _left_2d(model: System, work: FrictionWork, slip: Floats) -> SlipField:
+    points = model.space.cracks[work.crack].points
+    place = _places(points, model.lips[work.crack])
+    return SlipField(points, lock(place), lock(slip[:, 0]))
 
 
-def _left_3d(model: System, rubbing: FrictionWork, along: Floats) -> SlipField:
-    lips = model.lips[rubbing.crack]
-    slip = np.einsum("qm,qmd->qd", along, rubbing.tangents)
+def _left_3d(model: System, work: FrictionWork, slip_components: Floats) -> SlipField:
+    lips = model.lips[work.crack]
+    slip = np.einsum("qm,qmd->qd", slip_components, work.tangents)
     return SlipField(lips.x, lock(np.sqrt(lips.weight)), lock(slip))
 
 
-def _again_2d(model: System, c: int, tangents: Floats, before: SlipField) -> Floats:
+def _again_2d(model: System, c: int, tangents: Floats, earlier_slip: SlipField) -> Floats:
     lips, points = model.lips[c], model.space.cracks[c].points
-    first = _first_point_number(before.points, points)
-    line_length = np.linalg.norm(np.diff(before.points, axis=0), axis=1).sum()
-    if _distance(before.points, points, first) > _OTHER * line_length:
+    first = _first_point_number(earlier_slip.points, points)
+    line_length = np.linalg.norm(np.diff(earlier_slip.points, axis=0), axis=1).sum()
+    if _distance(earlier_slip.points, points, first) > _OTHER * line_length:
         return np.zeros((len(lips), 1))
     place = _places(points, lips) - first
-    inside = (place >= 0) & (place <= len(before.points) - 1)
-    slip = np.where(inside, np.interp(place, before.place, before.slip), 0.0)
+    is_inside = (place >= 0) & (place <= len(earlier_slip.points) - 1)
+    slip = np.where(is_inside, np.interp(place, earlier_slip.place, earlier_slip.slip), 0.0)
     return np.asarray(slip[:, None])
 
 
-def _again_3d(model: System, c: int, tangents: Floats, before: SlipField) -> Floats:
+def _again_3d(model: System, c: int, tangents: Floats, earlier_slip: SlipField) -> Floats:
     """Of the nearest point before, none farther than its own piece of face is wide."""
-    distance, nearest = cKDTree(before.points).query(model.lips[c].x)
-    slip = np.where((distance <= before.place[nearest])[:, None], before.slip[nearest], 0.0)
+    distance, nearest = cKDTree(earlier_slip.points).query(model.lips[c].x)
+    slip = np.where(
+        (distance <= earlier_slip.place[nearest])[:, None], earlier_slip.slip[nearest], 0.0
+    )
     return np.einsum("qmd,qd->qm", tangents, slip)
 
 
@@ -135,20 +139,26 @@ def _places(points: Floats, lips: LipPoints) -> Floats:
     return np.interp(arc_position(points, lips.x), ends, np.arange(len(points)))
 
 
-def _first_point_number(old: Floats, new: Floats) -> int:
+def _first_point_number(old_points: Floats, new_points: Floats) -> int:
     """Number of the new point that the first old one is.
 
     Cracks grow by points at their ends, and corrections move the last ones a little.
     """
-    shifts = range(min(0, len(new) - len(old)), max(1, len(new) - len(old) + 1))
-    return min(shifts, key=lambda shift: _distance(old, new, shift))
+    shifts = range(
+        min(0, len(new_points) - len(old_points)), max(1, len(new_points) - len(old_points) + 1)
+    )
+    return min(shifts, key=lambda shift: _distance(old_points, new_points, shift))
 
 
-def _distance(old: Floats, new: Floats, shift: int) -> float:
+def _distance(old_points: Floats, new_points: Floats, shift: int) -> float:
     """Median distance of old points to the new ones that they would be."""
-    first, last = max(0, -shift), min(len(old), len(new) - shift)
+    first, last = max(0, -shift), min(len(old_points), len(new_points) - shift)
     return float(
-        np.median(np.linalg.norm(old[first:last] - new[first + shift : last + shift], axis=1))
+        np.median(
+            np.linalg.norm(
+                old_points[first:last] - new_points[first + shift : last + shift], axis=1
+            )
+        )
     )
 
 
@@ -204,9 +214,9 @@ def at_rest(rows: FrictionRows, status: Status) -> SlipPoint:
 
 def with_slip(rows: FrictionRows, d: Floats, slip: Floats, status: Status) -> SlipPoint:
     """A state whose weak slips `(r,)` before are given: faces that press stick there, or slide."""
-    before = np.concatenate([np.zeros(rows.n), slip])
-    state = _tractions(rows, d - before, status)
-    return SlipPoint(d, state.lam, state.gap + before, state.status, sets=state.sets)
+    initial_slip = np.concatenate([np.zeros(rows.n), slip])
+    state = _tractions(rows, d - initial_slip, status)
+    return SlipPoint(d, state.lam, state.gap + initial_slip, state.status, sets=state.sets)
 
 
 def march(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) -> list[SlipPoint]:
@@ -249,9 +259,9 @@ def shaken_down(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) 
     weight = 1 / rows.sizes
     places = march(rows, d, begin, substeps)
     for _ in range(_MOST_CYCLES):
-        before = places[-1]
-        places = march(rows, d, before, substeps)
-        drift = float(np.abs((places[-1].gap - before.gap)[rows.n :] * weight[rows.n :]).max())
+        start_place = places[-1]
+        places = march(rows, d, start_place, substeps)
+        drift = float(np.abs((places[-1].gap - start_place.gap)[rows.n :] * weight[rows.n :]).max())
         largest = max(float(np.abs(place.gap * weight).max()) for place in places)
         if drift <= _RETURNED * largest:
             return places
@@ -266,10 +276,10 @@ def shaken_down(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) 
 def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: int) -> SlipPoint:
     """The next state."""
     longest = 1.0 if begin.at_rest else 1.0 / substeps
-    shortest = min(longest, _SHORTEST)
+    shortest_step = min(longest, _SHORTEST)
     t, step, place = 0.0, longest, begin
-    dissipated, sets = 0.0, 0
-    between: list[tuple[float, Floats]] = []
+    work, sets = 0.0, 0
+    tractions_between: list[tuple[float, Floats]] = []
     while t < 1.0:
         end = t + step
         end = 1.0 if end > 1.0 - 1e-9 else end
@@ -277,16 +287,18 @@ def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: in
         state = _friction_solution(rows, d, place)
         sets = max(sets, state.sets)
         closing = state.status.closed & _open_functions(rows, place)
-        if closing.any() and step > shortest:
-            step = max(step / 2, shortest)
+        if closing.any() and step > shortest_step:
+            step = max(step / 2, shortest_step)
             continue
-        dissipated += _friction_work(rows, place, state)
+        work += _friction_work(rows, place, state)
         gap = state.gap.copy()
         gap[rows.n :] += place.gap[rows.n :]
         place = SlipPoint(d, state.lam, gap, state.status)
-        between.append((end, state.lam))
+        tractions_between.append((end, state.lam))
         t, step = end, min(2 * step, longest)
-    return SlipPoint(place.d, place.lam, place.gap, place.status, dissipated, sets, tuple(between))
+    return SlipPoint(
+        place.d, place.lam, place.gap, place.status, work, sets, tuple(tractions_between)
+    )
 
 
 def _friction_solution(rows: FrictionRows, d: Floats, place: SlipPoint) -> FrictionState:
@@ -328,10 +340,10 @@ def _open_functions(rows: FrictionRows, place: SlipPoint) -> Bools:
     return np.asarray(place.gap[: rows.n] / rows.measure > _OPEN * largest)
 
 
-def _friction_work(rows: FrictionRows, before: SlipPoint, state: FrictionState) -> float:
+def _friction_work(rows: FrictionRows, start_place: SlipPoint, state: FrictionState) -> float:
     """Work of the tractions of slipping functions: their mean bound over the substep times slip."""
     slips = state.status.slips
-    pressure = 0.5 * (np.maximum(before.lam, 0.0) + state.lam)[: rows.n][rows.rubbing]
+    pressure = 0.5 * (np.maximum(start_place.lam, 0.0) + state.lam)[: rows.n][rows.rubbing]
     slip = np.sqrt((state.gap[rows.n :].reshape(rows.tangents, -1) ** 2).sum(axis=0))
     return float((rows.mu * pressure * slip)[slips].sum())
 
@@ -378,9 +390,9 @@ def _tangents_2d(lips: LipPoints) -> Floats:
 
 def _tangents_3d(lips: LipPoints) -> Floats:
     n = lips.normal
-    along = np.linalg.eigh(n.T @ (lips.weight[:, None] * n))[1][:, 0]
-    along = along * np.sign(along[np.argmax(np.abs(along))])
-    first = along - (n @ along)[:, None] * n
+    first_direction = np.linalg.eigh(n.T @ (lips.weight[:, None] * n))[1][:, 0]
+    first_direction = first_direction * np.sign(first_direction[np.argmax(np.abs(first_direction))])
+    first = first_direction - (n @ first_direction)[:, None] * n
     size = np.linalg.norm(first, axis=1, keepdims=True)
     first = np.where(size > 1e-6, first / np.maximum(size, 1e-300), np.roll(n, 1, axis=1))
     first = first - np.einsum("qi,qi->q", first, n)[:, None] * n
@@ -402,7 +414,7 @@ def tangential_jumps(
 ) -> list[sp.csr_matrix]:
     """Jumps along directions `(q, m, d)` at the lip points, each `(q, n_dof)`."""
     every = np.moveaxis(directions, 1, 0)
-    return [jump_matrix(space, c, lips, along) for along in every]
+    return [jump_matrix(space, c, lips, tangents) for tangents in every]
 
 
 def solve_friction(
@@ -414,8 +426,8 @@ def solve_friction(
     u_imposed: Floats,
     start: Bools | None,
     stiffness: float,
-    between: bool,
-    before: Sequence[SlipField | None] | None,
+    with_substeps: bool,
+    earlier_slip: Sequence[SlipField | None] | None,
     springs: Sequence[Floats] | None = None,
 ) -> FrictionSolution:
     """Solve all load states in their order, from the unloaded body; or a cycle that is repeated.
@@ -432,9 +444,9 @@ def solve_friction(
         First guess of the closed set.
     stiffness : float, stress / length
         As of `ContactRows`.
-    between : bool
+    with_substeps : bool
         Whether displacements of the substeps are asked for.
-    before : sequence of SlipField or None
+    earlier_slip : sequence of SlipField or None
         Of all cracks, for a cycle that is repeated until slip returns: what its last state left
         behind when the crack was shorter; empty where there was none. None: the path alone.
     springs : sequence of (g,) arrays, optional
@@ -446,45 +458,51 @@ def solve_friction(
         A load for which no status of the functions stays.
     """
     faces = [_face(problem, model, m) for m in chosen]
-    rubbing = [face for face in faces if face.mu > 0]
-    along = [face.slip_rows[k] for k in range(model.space.dim - 1) for face in rubbing]
-    N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + along))
-    small = engine.condense(N, f, u_imposed)
-    rows = _rows(faces, small.dual, stiffness)
+    rubbing_faces = [face for face in faces if face.mu > 0]
+    slip_rows = [face.slip_rows[k] for k in range(model.space.dim - 1) for face in rubbing_faces]
+    N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + slip_rows))
+    condensed = engine.condense(N, f, u_imposed)
+    rows = _rows(faces, condensed.dual, stiffness)
     if springs is not None:
         every = np.concatenate(springs)
         diagonal = np.concatenate([every, np.tile(every[rows.rubbing], rows.tangents)])
         method = problem.numerics.contact_method
-        augmented = method is not None and method.updates
-        rows = replace(rows, F=rows.F + np.diag(diagonal), compliance=diagonal, augmented=augmented)
+        is_augmented = method is not None and method.updates
+        rows = replace(
+            rows, F=rows.F + np.diag(diagonal), compliance=diagonal, augmented=is_augmented
+        )
     status = all_stuck(rows)
     if start is not None:
         status = Status(start, status.slip)
     elif problem.numerics.initial_set == "open":
         status = Status(np.zeros_like(status.closed), status.slip)
     begin, pass_through = at_rest(rows, status), march
-    if before is not None:
+    if earlier_slip is not None:
         pass_through = shaken_down
-        slip_left = {c: slip for c, slip in enumerate(before)}
-        slips = [slip_left.get(r.space.crack) for r in rubbing]  # cracks may have joined others
+        slip_left = {c: slip for c, slip in enumerate(earlier_slip)}
+        slips = [
+            slip_left.get(r.space.crack) for r in rubbing_faces
+        ]  # cracks may have joined others
         if any(slip is not None for slip in slips):
-            weak = [
+            slip_of_faces = [
                 weak_slip(model, r.space, r.tangents, s)
-                for r, s in zip(rubbing, slips, strict=True)
+                for r, s in zip(rubbing_faces, slips, strict=True)
             ]
-            begin = with_slip(rows, small.gap[:, -1], np.concatenate(weak, axis=1).ravel(), status)
-    places = pass_through(rows, small.gap, begin, problem.numerics.substeps)
-    u = small.displacements(np.stack([place.lam for place in places], axis=1))
+            begin = with_slip(
+                rows, condensed.gap[:, -1], np.concatenate(slip_of_faces, axis=1).ravel(), status
+            )
+    places = pass_through(rows, condensed.gap, begin, problem.numerics.substeps)
+    u = condensed.displacements(np.stack([place.lam for place in places], axis=1))
     states = [
         StateContact(p.lam[: rows.n], p.gap[: rows.n], p.status.closed, p.sets, u[:, k])
         for k, p in enumerate(places)
     ]
     return FrictionSolution(
         states,
-        _by_crack(rubbing, rows, places),
+        _by_crack(rubbing_faces, rows, places),
         tuple(place.dissipated for place in places),
         _substep_displacements(engine, N, f, u_imposed, places)
-        if between
+        if with_substeps
         else np.zeros((len(f), 0)),
     )
 
@@ -508,22 +526,22 @@ def _face(problem: Problem, model: System, m: Multipliers) -> _Face:
         return _Face(m, mu, normal, np.zeros((0, 0, 0)), [], [])
     directions = tangents(lips)
     jumps = tangential_jumps(model.space, m.crack, lips, directions)
-    along = [gap_rows(m, lips, jump) for jump in jumps]
-    return _Face(m, mu, normal, directions, jumps, along)
+    slip_rows = [gap_rows(m, lips, jump) for jump in jumps]
+    return _Face(m, mu, normal, directions, jumps, slip_rows)
 
 
 def _rows(faces: Sequence[_Face], dual: Floats, stiffness: float) -> FrictionRows:
     measure = np.concatenate([face.space.measure for face in faces])
     mu = np.concatenate([np.full(len(face.space.measure), face.mu) for face in faces])
-    rubbing = np.nonzero(mu > 0)[0]
-    return FrictionRows(dual, measure, rubbing, mu[rubbing], stiffness)
+    rubbing_rows = np.nonzero(mu > 0)[0]
+    return FrictionRows(dual, measure, rubbing_rows, mu[rubbing_rows], stiffness)
 
 
 def _by_crack(
     faces: Sequence[_Face], rows: FrictionRows, places: Sequence[SlipPoint]
 ) -> list[FrictionWork]:
     shear = np.stack([place.lam[rows.n :].reshape(rows.tangents, -1) for place in places], axis=2)
-    stuck = np.stack([p.status.closed[rows.rubbing] & ~p.status.slips for p in places])
+    is_stuck = np.stack([p.status.closed[rows.rubbing] & ~p.status.slips for p in places])
     result, first = [], 0
     for face in faces:
         rows_of_crack = slice(first, first + len(face.space.measure))
@@ -533,7 +551,7 @@ def _by_crack(
                 lock(face.tangents),
                 face.jumps,
                 shear[:, rows_of_crack],
-                stuck[:, rows_of_crack],
+                is_stuck[:, rows_of_crack],
             )
         )
         first = rows_of_crack.stop
@@ -544,16 +562,16 @@ def _substep_displacements(
     engine: Engine, N: sp.csr_matrix, f: Floats, u_imposed: Floats, places: Sequence[SlipPoint]
 ) -> Floats:
     """Displacements of all substeps: other faces may overlap in one of them."""
-    loads, given = [], []
-    before = np.zeros(len(f)), np.zeros(len(f))
+    loads, imposed = [], []
+    previous_load = np.zeros(len(f)), np.zeros(len(f))
     for k, place in enumerate(places):
         for share, lam in place.between[:-1]:
-            loads.append(before[0] + share * (f[:, k] - before[0]) + N.T @ lam)
-            given.append(before[1] + share * (u_imposed[:, k] - before[1]))
-        before = f[:, k], u_imposed[:, k]
+            loads.append(previous_load[0] + share * (f[:, k] - previous_load[0]) + N.T @ lam)
+            imposed.append(previous_load[1] + share * (u_imposed[:, k] - previous_load[1]))
+        previous_load = f[:, k], u_imposed[:, k]
     if not loads:
         return np.zeros((len(f), 0))
-    return engine.solve(np.stack(loads, axis=1), np.stack(given, axis=1))
+    return engine.solve(np.stack(loads, axis=1), np.stack(imposed, axis=1))
 
 
 __all__ = [

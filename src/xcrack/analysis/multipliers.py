@@ -64,24 +64,24 @@ def multipliers(
     c: int,
     lips: LipPoints,
     kind: str,
-    fixed: Bools | None = None,
-    rubs: bool = False,
+    is_fixed: Bools | None = None,
+    has_friction: bool = False,
     material: Ints | None = None,
 ) -> Multipliers:
     """Multiplier space of crack c: "reduced", "sparse" or "naive".
 
     Where supports decide the jump, as at a mouth in a side whose displacement is imposed, a group
-    of its own would be redundant: with `fixed` (n_dof,) it joins its neighbour. Where the faces rub
-    the tangential jump counts as the normal one does. Where the crack crosses from one `material`
-    (the number of that of each cell) into another, pressures jump.
+    of its own would be redundant: with `is_fixed` (n_dof,) it joins its neighbour. Where the faces
+    rub the tangential jump counts as the normal one does. Where the crack crosses from one
+    `material` (the number of that of each cell) into another, pressures jump.
     """
     nodes, traces = _traces(space, lips)
     hats = _HATS[kind] if kind != "naive" and space.order == 2 and space.dim == 2 else None
     parts = _parts(space, c, lips, material) if kind != "naive" else []
     values = traces
     if kind != "naive":
-        supported = _supported_nodes(space, c, nodes, traces, lips, fixed, rubs)
-        group = _groups(space, c, nodes, traces, lips.weight, supported)
+        is_supported = _supported_nodes(space, c, nodes, traces, lips, is_fixed, has_friction)
+        group = _groups(space, c, nodes, traces, lips.weight, is_supported)
         shape = (len(lips), int(group.max(initial=-1)) + 1)
         column = group.astype(np.int32)[traces.indices]
         values = sp.csr_matrix((traces.data, column, traces.indptr), shape=shape)
@@ -94,16 +94,16 @@ def multipliers(
     if space.dim == 3:
         values.sum_duplicates()
     elif len(parts) > 1:
-        kinked, crosses = len(space.cuts[c].kinks.points) > 0, material is not None
-        values = _broken_functions(values, lips, parts, hats, kinked, crosses)
+        is_kinked, has_interface = len(space.cuts[c].kinks.points) > 0, material is not None
+        values = _broken_functions(values, lips, parts, hats, is_kinked, has_interface)
     elif hats is not None and values.shape[1] > 1:
         mass = _sums(values, lips.weight)
         centre = _sums(values, lips.weight * lips.s) / np.maximum(mass, 1e-300)
         knots = np.unique(centre[mass > 1e-14 * mass.max()])
-        curved = _curved_points(
+        is_curved = _curved_points(
             lips, np.arange(len(lips)), np.interp(lips.s, knots, np.arange(len(knots)))
         )
-        values = _hats(_knots_by_groups(knots, lips.s, curved, hats), lips.s)
+        values = _hats(_knots_by_groups(knots, lips.s, is_curved, hats), lips.s)
     elif kind != "naive":
         values.sum_duplicates()
     measure = _sums(values, lips.weight)
@@ -133,9 +133,9 @@ def _parts(space: FunctionSpace, c: int, lips: LipPoints, material: Ints | None)
         part = np.searchsorted(np.sort(arc_position(line, ends)) - begin, lips.s)
     if material is not None and len(lips):
         order = np.argsort(lips.s, kind="stable")
-        crosses = (np.diff(material[lips.cell[order]], axis=0) != 0).any(axis=1)
-        crosses |= np.diff(part[order]) != 0
-        part[order] = np.concatenate([[0], np.cumsum(crosses)])
+        is_crossing = (np.diff(material[lips.cell[order]], axis=0) != 0).any(axis=1)
+        is_crossing |= np.diff(part[order]) != 0
+        part[order] = np.concatenate([[0], np.cumsum(is_crossing)])
     parts = [np.nonzero(part == k)[0] for k in np.unique(part)]
     return parts if len(parts) > 1 else []
 
@@ -145,8 +145,8 @@ def _broken_functions(
     lips: LipPoints,
     parts: list[Ints],
     hats: tuple[float, float] | None,
-    kinked: bool,
-    crosses: bool,
+    is_kinked: bool,
+    has_interface: bool,
 ) -> sp.csr_matrix:
     """Functions that end where pressures jump: junctions, kinks, interfaces.
 
@@ -156,13 +156,15 @@ def _broken_functions(
     # Share of groups at each point: their sum over a part grows steadily with the part.
     groups = lips.weight * (values @ (1 / np.maximum(mass, 1e-14 * mass.max())))
     columns = []
-    for rows in _long_enough(parts, groups) if kinked or crosses else parts:
+    for rows in _long_enough(parts, groups) if is_kinked or has_interface else parts:
         if hats is None:
-            lesser = np.zeros(len(mass), dtype=bool)
-            if crosses:  # of a group that an interface cuts one piece stands: both share its nodes
-                lesser = _sums(values[rows], lips.weight[rows]) <= (0.5 + _SAME) * mass
+            is_lesser = np.zeros(len(mass), dtype=bool)
+            if (
+                has_interface
+            ):  # of a group that an interface cuts one piece stands: both share its nodes
+                is_lesser = _sums(values[rows], lips.weight[rows]) <= (0.5 + _SAME) * mass
             part = _without_small(
-                values[rows], lips.weight[rows], lips.s[rows], np.median(mass), lesser
+                values[rows], lips.weight[rows], lips.s[rows], np.median(mass), is_lesser
             )
         else:
             # Faces between kinks and junctions are whole cracks to pressures.
@@ -182,7 +184,7 @@ def _sides_of_arm(space: FunctionSpace, joint: Joint, lips: LipPoints) -> tuple[
 
 
 def _split_groups(
-    values: sp.csr_matrix, weight: Floats, material: Ints, beside: Bools | None = None
+    values: sp.csr_matrix, weight: Floats, material: Ints, is_beside: Bools | None = None
 ) -> sp.csr_matrix:
     """Groups on a surface that end at interfaces or junctions, where pressures jump.
 
@@ -196,7 +198,7 @@ def _split_groups(
     weight : (q,) array
     material : (q, k) array of int
         Of the cells on both sides of each point, or the side of a crack that ends there.
-    beside : (q,) array of bool, optional
+    is_beside : (q,) array of bool, optional
         Points in cells with an interface: only groups that reach these end there.
     """
     pairs, part = np.unique(material, axis=0, return_inverse=True)
@@ -205,49 +207,57 @@ def _split_groups(
     part = part.ravel()
     columns: list[sp.csr_matrix] = []
     total = _sums(values, weight)
-    typical = float(np.median(total))
+    typical_total = float(np.median(total))
     group_of = np.full((len(pairs), len(total)), -1)  # of pieces that stand
     pieces = [
         sp.csr_matrix(sp.diags((part == p).astype(float)) @ values) for p in range(len(pairs))
     ]
     mass = np.stack([_sums(piece, weight) for piece in pieces])
-    if beside is not None:  # the others stay whole, with the part in which they have most
-        whole = np.nonzero(_sums(values, weight * beside) <= 1e-14 * typical)[0]
-        most = mass.argmax(axis=0)
-        stays = np.zeros(len(total), dtype=bool)
-        stays[whole] = True
+    if is_beside is not None:  # the others stay whole, with the part in which they have most
+        whole_groups = np.nonzero(_sums(values, weight * is_beside) <= 1e-14 * typical_total)[0]
+        largest_part = mass.argmax(axis=0)
+        is_retained = np.zeros(len(total), dtype=bool)
+        is_retained[whole_groups] = True
         pieces = [
             sp.csr_matrix(
-                piece @ sp.diags((~stays).astype(float))
-                + values @ sp.diags((stays & (most == p)).astype(float))
+                piece @ sp.diags((~is_retained).astype(float))
+                + values @ sp.diags((is_retained & (largest_part == p)).astype(float))
             )
             for p, piece in enumerate(pieces)
         ]
         mass = np.stack([_sums(piece, weight) for piece in pieces])
-    standing = mass > (0.5 + _SAME) * total
+    is_standing = mass > (0.5 + _SAME) * total
     count = 0
     for p, piece in enumerate(pieces):
-        present = mass[p] > 1e-14 * typical
-        if present.any() and not standing[p].any() and mass[p].sum() >= _SHORT * typical:
-            standing[p, int(np.argmax(mass[p]))] = True
-        group_of[p, standing[p]] = count + np.arange(int(standing[p].sum()))
-        count += int(standing[p].sum())
+        is_present = mass[p] > 1e-14 * typical_total
+        if (
+            is_present.any()
+            and not is_standing[p].any()
+            and mass[p].sum() >= _SHORT * typical_total
+        ):
+            is_standing[p, int(np.argmax(mass[p]))] = True
+        group_of[p, is_standing[p]] = count + np.arange(int(is_standing[p].sum()))
+        count += int(is_standing[p].sum())
         overlap = np.abs(piece.T @ sp.diags(weight) @ piece).toarray()
-        waiting = np.nonzero(present & ~standing[p])[0]
-        while len(waiting):
-            known = group_of[p] >= 0
-            shared = overlap[waiting] * known
-            best = shared.argmax(axis=1) if known.any() else np.zeros(len(waiting), dtype=np.int64)
-            joins = shared[np.arange(len(waiting)), best] > 0
-            if not joins.any():
+        waiting_functions = np.nonzero(is_present & ~is_standing[p])[0]
+        while len(waiting_functions):
+            has_group = group_of[p] >= 0
+            shared_overlap = overlap[waiting_functions] * has_group
+            best = (
+                shared_overlap.argmax(axis=1)
+                if has_group.any()
+                else np.zeros(len(waiting_functions), dtype=np.int64)
+            )
+            is_joining = shared_overlap[np.arange(len(waiting_functions)), best] > 0
+            if not is_joining.any():
                 break
-            group_of[p, waiting[joins]] = group_of[p, best[joins]]
-            waiting = waiting[~joins]
+            group_of[p, waiting_functions[is_joining]] = group_of[p, best[is_joining]]
+            waiting_functions = waiting_functions[~is_joining]
     # What found none stays with the piece of its group that stands elsewhere, or with the first.
-    for p, g in zip(*np.nonzero((group_of < 0) & (mass > 1e-14 * typical))):
-        elsewhere = group_of[:, g][group_of[:, g] >= 0]
-        if len(elsewhere):
-            group_of[p, g] = elsewhere[0]
+    for p, g in zip(*np.nonzero((group_of < 0) & (mass > 1e-14 * typical_total))):
+        other_groups = group_of[:, g][group_of[:, g] >= 0]
+        if len(other_groups):
+            group_of[p, g] = other_groups[0]
         else:
             group_of[p, g], count = count, count + 1
     for p, piece in enumerate(pieces):
@@ -258,22 +268,22 @@ def _split_groups(
 
 
 def _without_small(
-    values: sp.csr_matrix, weight: Floats, s: Floats, typical: float, lesser: Bools
+    values: sp.csr_matrix, weight: Floats, s: Floats, typical_total: float, is_lesser: Bools
 ) -> sp.csr_matrix:
     """Functions on a part of the crack faces; what is small, or lesser, joins a neighbour."""
     mass = _sums(values, weight)
-    present = np.nonzero(mass > 1e-14 * typical)[0]
-    large_values, lesser = values[:, present].toarray(), lesser[present]
+    present_columns = np.nonzero(mass > 1e-14 * typical_total)[0]
+    large_values, is_lesser = values[:, present_columns].toarray(), is_lesser[present_columns]
     while True:
         mass = large_values.T @ weight
         order = np.argsort((large_values.T @ (weight * s)) / mass)
-        large_values, mass, lesser = large_values[:, order], mass[order], lesser[order]
-        k = int(np.argmax(lesser)) if lesser.any() else _smallest_number(mass)
-        if len(mass) == 1 or (mass[k] >= _SMALL * typical and not lesser[k]):
+        large_values, mass, is_lesser = large_values[:, order], mass[order], is_lesser[order]
+        k = int(np.argmax(is_lesser)) if is_lesser.any() else _smallest_number(mass)
+        if len(mass) == 1 or (mass[k] >= _SMALL * typical_total and not is_lesser[k]):
             return sp.csr_matrix(large_values)
         neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(mass)]
         large_values[:, neighbours[_smallest_number(mass[neighbours])]] += large_values[:, k]
-        large_values, lesser = np.delete(large_values, k, axis=1), np.delete(lesser, k)
+        large_values, is_lesser = np.delete(large_values, k, axis=1), np.delete(is_lesser, k)
 
 
 def _smallest_number(sizes: Floats) -> int:
@@ -304,12 +314,12 @@ def _traces(space: FunctionSpace, lips: LipPoints) -> tuple[Ints, sp.csr_matrix]
     order = place.argsort(axis=1)
     place = np.take_along_axis(place, order, axis=1)
     entry = np.take_along_axis(lips.bary[:, 1], order, axis=1)
-    acts = np.abs(entry) > 1e-13
-    reached = np.bincount(place[acts], minlength=len(nodes)) > 0
-    column = (reached.cumsum() - 1).astype(np.int32)[place[acts]]
-    start = offsets(acts.sum(axis=1)).astype(np.int32)
-    shape = (len(cell), int(reached.sum()))
-    return nodes[reached], sp.csr_matrix((entry[acts], column, start), shape=shape)
+    is_active = np.abs(entry) > 1e-13
+    is_reached = np.bincount(place[is_active], minlength=len(nodes)) > 0
+    column = (is_reached.cumsum() - 1).astype(np.int32)[place[is_active]]
+    start = offsets(is_active.sum(axis=1)).astype(np.int32)
+    shape = (len(cell), int(is_reached.sum()))
+    return nodes[is_reached], sp.csr_matrix((entry[is_active], column, start), shape=shape)
 
 
 def _supported_nodes(
@@ -318,20 +328,20 @@ def _supported_nodes(
     nodes: Ints,
     traces: sp.csr_matrix,
     lips: LipPoints,
-    fixed: Bools | None,
-    rubs: bool,
+    is_fixed: Bools | None,
+    has_friction: bool,
 ) -> Bools:
     """Which of the nodes have a jump, of those that count, that supports decide."""
     number = space.heaviside[c][nodes]
-    if fixed is None:
+    if is_fixed is None:
         return np.zeros(len(nodes), dtype=bool)
     normal = np.stack([_sums(traces, lips.weight * n) for n in lips.normal.T], axis=1)
-    given = fixed.reshape(-1, space.dim)[number]
+    is_imposed = is_fixed.reshape(-1, space.dim)[number]
     squares = (normal**2).sum(axis=1)
-    decided = (normal**2 * given).sum(axis=1) > 0.5 * squares
-    if rubs:
-        decided |= ((squares[:, None] - normal**2) * given).sum(axis=1) > 0.5 * squares
-    return np.asarray((number >= 0) & decided)
+    is_decided = (normal**2 * is_imposed).sum(axis=1) > 0.5 * squares
+    if has_friction:
+        is_decided |= ((squares[:, None] - normal**2) * is_imposed).sum(axis=1) > 0.5 * squares
+    return np.asarray((number >= 0) & is_decided)
 
 
 def _groups(
@@ -340,20 +350,20 @@ def _groups(
     nodes: Ints,
     traces: sp.csr_matrix,
     weight: Floats,
-    supported: Bools,
+    is_supported: Bools,
 ) -> Ints:
     """Group number of each node."""
     mesh, cut = space.mesh, space.cuts[c]
     edges = np.nonzero(~np.isnan(cut.cut_edge))[0]
     pairs = mesh.edges[edges]
-    vital = vital_edges(
+    is_vital = vital_edges(
         pairs,
         np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1),
         _places_along(space, c, edges),
     )
     place = {int(n): i for i, n in enumerate(nodes)}
     parent = np.arange(len(nodes))
-    covered = np.zeros(len(nodes), dtype=bool)
+    is_covered = np.zeros(len(nodes), dtype=bool)
 
     def root(i: int) -> int:
         while parent[i] != i:
@@ -361,54 +371,63 @@ def _groups(
             i = int(parent[i])
         return i
 
-    for a, b in pairs[vital]:
+    for a, b in pairs[is_vital]:
         # An end of a cut edge at a sliver may have no trace that is seen; its star keeps the rest.
         i, j = place.get(int(a)), place.get(int(b))
         for end in (i, j):
             if end is not None:
-                covered[end] = True
+                is_covered[end] = True
         if i is not None and j is not None:
             parent[root(i)] = root(j)
     on_crack = cut.level_set.phi[nodes] == 0
-    inside = cut.level_set.inside[nodes] < 0
+    is_inside = cut.level_set.inside[nodes] < 0
     # Nodes on the crack carry a group of their own, unless the tip lies on them, or they lie
     # beyond a junction.
-    is_free_node = on_crack & inside & ~covered & (space.node_side[c][nodes] != 0)
-    covered |= is_free_node
-    if supported.any():
+    is_free_node = on_crack & is_inside & ~is_covered & (space.node_side[c][nodes] != 0)
+    is_covered |= is_free_node
+    if is_supported.any():
         roots = np.array([root(i) for i in range(len(nodes))])
         mass = _sums(traces, weight)
         total = np.bincount(roots, mass, len(nodes))
-        covered &= np.bincount(roots, mass * supported, len(nodes))[roots] < 0.5 * total[roots]
-        parent[~covered] = np.nonzero(~covered)[0]
-    if covered.any() and not covered.all():
-        for k, to in _nearest_nodes(traces, weight, covered):
+        is_covered &= (
+            np.bincount(roots, mass * is_supported, len(nodes))[roots] < 0.5 * total[roots]
+        )
+        parent[~is_covered] = np.nonzero(~is_covered)[0]
+    if is_covered.any() and not is_covered.all():
+        for k, to in _nearest_nodes(traces, weight, is_covered):
             parent[k] = root(to)
     roots = np.array([root(i) for i in range(len(nodes))])
     return np.unique(roots, return_inverse=True)[1]
 
 
-def _nearest_nodes(traces: sp.csr_matrix, weight: Floats, covered: Bools) -> list[tuple[int, int]]:
+def _nearest_nodes(
+    traces: sp.csr_matrix, weight: Floats, is_covered: Bools
+) -> list[tuple[int, int]]:
     """Nodes that are not covered, each with the covered node of which the trace overlaps most.
 
     The first of equal ones counts; a node that overlaps none is left out.
     """
     counts = np.diff(traces.indptr)
     point = np.arange(len(counts)).repeat(counts)
-    uncovered = np.nonzero(~covered[traces.indices])[0]
-    row, place = ranges(counts[point[uncovered]])
-    uncovered, other = uncovered[row], traces.indptr[point[uncovered]][row] + place
-    shared = covered[traces.indices[other]]
-    uncovered, other = uncovered[shared], other[shared]
+    uncovered_entries = np.nonzero(~is_covered[traces.indices])[0]
+    row, place = ranges(counts[point[uncovered_entries]])
+    uncovered_entries, other = (
+        uncovered_entries[row],
+        traces.indptr[point[uncovered_entries]][row] + place,
+    )
+    is_shared = is_covered[traces.indices[other]]
+    uncovered_entries, other = uncovered_entries[is_shared], other[is_shared]
     pair, number = np.unique(
-        traces.indices[uncovered] * np.int64(len(covered)) + traces.indices[other],
+        traces.indices[uncovered_entries] * np.int64(len(is_covered)) + traces.indices[other],
         return_inverse=True,
     )
-    products = traces.data[uncovered] * weight[point[uncovered]] * traces.data[other]
+    products = (
+        traces.data[uncovered_entries] * weight[point[uncovered_entries]] * traces.data[other]
+    )
     overlap = np.bincount(number, products, len(pair))
-    node, to = np.divmod(pair, len(covered))
+    node, to = np.divmod(pair, len(is_covered))
     # Of overlaps that are equal but for round-off the first node counts.
-    largest = np.zeros(len(covered))
+    largest = np.zeros(len(is_covered))
     np.maximum.at(largest, node, overlap)
     share = np.rint(overlap / (_SAME * np.where(largest > 0, largest, 1.0))[node])
     best = np.lexsort((to, -share, node))
@@ -453,25 +472,25 @@ def vital_edges(pairs: Ints, length: Floats, place: Floats) -> Ints:
 
     def entry(e: int) -> tuple[int, int, int, int, int, int]:
         a, b = ends[e]
-        weaker = min(degree[a], degree[b])
-        return (-weaker, -lengths[e], places[e], min(a, b), max(a, b), e)
+        lower_degree = min(degree[a], degree[b])
+        return (-lower_degree, -lengths[e], places[e], min(a, b), max(a, b), e)
 
     heap = [entry(e) for e in range(len(pairs))]
     heapq.heapify(heap)
-    vital = np.ones(len(pairs), dtype=bool)
+    is_vital = np.ones(len(pairs), dtype=bool)
     while heap:
         top = heapq.heappop(heap)
         e = top[-1]
-        current = entry(e)
-        if current[0] != top[0]:
-            heapq.heappush(heap, current)
+        current_entry = entry(e)
+        if current_entry[0] != top[0]:
+            heapq.heappush(heap, current_entry)
             continue
-        if current[0] >= -1:
+        if current_entry[0] >= -1:
             break
-        vital[e] = False
+        is_vital[e] = False
         for end in ends[e]:
             degree[end] -= 1
-    return np.nonzero(vital)[0]
+    return np.nonzero(is_vital)[0]
 
 
 def _in_steps(sizes: Floats) -> list[int]:
@@ -494,11 +513,11 @@ def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
     if len(knots) <= 3:
         return knots
     for _ in range(_PASSES):
-        old = knots.copy()
-        knots[2:-2] = (old[1:-3] + 2 * old[2:-2] + old[3:-1]) / 4
+        old_knots = knots.copy()
+        knots[2:-2] = (old_knots[1:-3] + 2 * old_knots[2:-2] + old_knots[3:-1]) / 4
         # Half of the way only: with four knots both ends would pass each other.
-        knots[1] = (old[1] + old[0] + last * (old[2] - old[0])) / 2
-        knots[-2] = (old[-2] + old[-1] - last * (old[-1] - old[-3])) / 2
+        knots[1] = (old_knots[1] + old_knots[0] + last * (old_knots[2] - old_knots[0])) / 2
+        knots[-2] = (old_knots[-2] + old_knots[-1] - last * (old_knots[-1] - old_knots[-3])) / 2
     return knots
 
 
@@ -512,26 +531,28 @@ def _curved_points(lips: LipPoints, rows: Ints, place: Floats) -> Bools:
     return np.array([np.ptp(turn[a:b]) > _CURVED for a, b in zip(first, last)], dtype=bool)
 
 
-def _knots_by_groups(knots: Floats, s: Floats, curved: Bools, hats: tuple[float, float]) -> Floats:
+def _knots_by_groups(
+    knots: Floats, s: Floats, is_curved: Bools, hats: tuple[float, float]
+) -> Floats:
     """Knots spread like the groups' centres, that reach the ends of the crack."""
-    denser, last = hats
+    density_ratio, last = hats
     ends = float(s.min()), float(s.max())
-    if denser == 1 or len(knots) < 2:
+    if density_ratio == 1 or len(knots) < 2:
         return _knots(knots, ends, last)
     # Knots between two centres, by the share of the faces between them that is straight.
     piece = np.clip(np.searchsorted(knots, s) - 1, 0, len(knots) - 2)
     total = np.bincount(piece, minlength=len(knots) - 1)
-    share = np.bincount(piece, curved, len(knots) - 1) / np.maximum(total, 1)
-    rise = np.append(0.0, np.cumsum(denser - (denser - 1) * share))
+    share = np.bincount(piece, is_curved, len(knots) - 1) / np.maximum(total, 1)
+    rise = np.append(0.0, np.cumsum(density_ratio - (density_ratio - 1) * share))
     place = np.linspace(0, rise[-1], max(int(rise[-1] + 1e-9), 1) + 1)
     return _knots(np.interp(place, rise, knots), ends, last)
 
 
 def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, float]) -> Floats:
     """Knots on a part of a crack, in proportion to the groups between each two."""
-    denser, last = hats
-    s, before = lips.s[rows], np.cumsum(groups) - groups / 2
-    density = np.where(_curved_points(lips, rows, before), 1.0, denser)
+    density_ratio, last = hats
+    s, places = lips.s[rows], np.cumsum(groups) - groups / 2
+    density = np.where(_curved_points(lips, rows, places), 1.0, density_ratio)
     mean = float(groups @ density / groups.sum())
     count = max(int(mean * (groups.sum() - 1) + _BESIDES + 1e-9), 2)
     weight = groups * density
@@ -565,7 +586,7 @@ def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.
     point = np.arange(len(counts), dtype=np.int32).repeat(counts)
     start = offsets(np.bincount(values.indices, minlength=values.shape[1])).astype(np.int32)
     entries = (values.data * lips.weight[point])[order]
-    turned = sp.csr_matrix((entries, point[order], start), shape=values.shape[::-1])
-    rows = turned @ jump
+    transpose = sp.csr_matrix((entries, point[order], start), shape=values.shape[::-1])
+    rows = transpose @ jump
     rows.sort_indices()
     return rows

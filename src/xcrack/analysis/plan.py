@@ -91,17 +91,17 @@ def forecast_of(problem: Problem, n_states: int = 1) -> Forecast:
     nodes = _count_nodes(mesh, order)
     per_point = nodes / mesh.n_points
     functions = sum(_enriched_functions(problem, crack, per_point) for crack in problem.placed)
-    standard, enriched = dim * nodes, round(dim * functions)
-    n = standard + enriched
+    standard, enriched_unknowns = dim * nodes, round(dim * functions)
+    n = standard + enriched_unknowns
     by_iteration = takes_iterations(problem, n)
     if by_iteration:
-        memory = float(np.dot(_OF_ROWS[order], (standard, enriched)))
+        memory = float(np.dot(_OF_ROWS[order], (standard, enriched_unknowns)))
         memory += _OF_STATE * (n_states - 1) * n
         memory *= _RUBBING if problem.contact != "off" and any(problem.frictions) else 1.0
     else:
         each, power = _OF_FACTOR[dim]
         memory = each * float(n) ** power
-    return Forecast(standard, enriched, order, by_iteration, memory, free_memory())
+    return Forecast(standard, enriched_unknowns, order, by_iteration, memory, free_memory())
 
 
 def check_memory(problem: Problem, n_states: int = 1) -> None:
@@ -113,46 +113,46 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
     """
     if _fits_surely(problem):
         return
-    ahead = forecast_of(problem, n_states)
-    if ahead.fits:
+    forecast = forecast_of(problem, n_states)
+    if forecast.fits:
         return
     remedy_list = ["larger cells away from the cracks", "or let xc.adapt choose the mesh"]
-    if not ahead.by_iteration and problem.mesh.dim == 3:
+    if not forecast.by_iteration and problem.mesh.dim == 3:
         remedy_list.insert(0, 'Numerics(linear="iterative")')
-    if ahead.order == 2:
-        less = forecast_of(replace(problem, order=1), n_states)
-        remedy_list.insert(0, f"order=1 ({_size(less.memory)}, with K less exact)")
-    raise SizeError(f"solve: {ahead}. Give {', '.join(remedy_list)}.")
+    if forecast.order == 2:
+        forecast_of_order_1 = forecast_of(replace(problem, order=1), n_states)
+        remedy_list.insert(0, f"order=1 ({_size(forecast_of_order_1.memory)}, with K less exact)")
+    raise SizeError(f"solve: {forecast}. Give {', '.join(remedy_list)}.")
 
 
 def _fits_surely(problem: Problem) -> bool:
     """Whether a factorisation in 2D fits if all nodes carry all functions: no look at cracks."""
-    mesh, free = problem.mesh, free_memory()
-    if free is None or mesh.dim == 3 or problem.numerics.linear == "iterative":
-        return free is None
+    mesh, free_bytes = problem.mesh, free_memory()
+    if free_bytes is None or mesh.dim == 3 or problem.numerics.linear == "iterative":
+        return free_bytes is None
     functions = [1 + problem.numerics.functions * crack.n_tips for crack in problem.placed]
     each, power = _OF_FACTOR[2]
     n = 2 * _count_nodes(mesh, problem.order or 1) * (1 + sum(functions))
-    return bool(each * float(n) ** power <= free)
+    return bool(each * float(n) ** power <= free_bytes)
 
 
 def takes_iterations(problem: Problem, n: int) -> bool:
     """Whether a system of n unknowns is solved by conjugate gradients."""
-    linear = problem.numerics.linear
-    if linear != "auto":
-        return linear == "iterative"
-    large = problem.mesh.dim == 3 and n > _DIRECT[problem.order or 1]
+    linear_solver = problem.numerics.linear
+    if linear_solver != "auto":
+        return linear_solver == "iterative"
+    is_large = problem.mesh.dim == 3 and n > _DIRECT[problem.order or 1]
     if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
         return False  # quadratic functions of both cracks nearly vanish together beside a junction
-    return large and problem.numerics.contact_method is None  # others change the matrix
+    return is_large and problem.numerics.contact_method is None  # others change the matrix
 
 
 def _count_nodes(mesh: Mesh, order: int) -> int:
     """Points and, at order 2, edges, by Euler's formula for a body without holes."""
     if order == 1:
         return mesh.n_points
-    flat = len(mesh.boundary) // 2 if mesh.dim == 3 else 0
-    return 2 * mesh.n_points + len(mesh.cells) + flat - 1
+    boundary_edges = len(mesh.boundary) // 2 if mesh.dim == 3 else 0
+    return 2 * mesh.n_points + len(mesh.cells) + boundary_edges - 1
 
 
 def _enriched_functions(problem: Problem, crack: Crack, per_point: float) -> float:
@@ -235,16 +235,16 @@ class Resultant:
     def sums_as_text(self) -> tuple[str, str]:
         """Force and moment as text; what is zero to round-off reads 0."""
         moment = (self.moment,) if isinstance(self.moment, float) else self.moment
-        least = 1e-12 * max(map(abs, (*self.force, *moment)))
-        return coordinates(_cut(self.force, least)), coordinates(_cut(moment, least))
+        tolerance = 1e-12 * max(map(abs, (*self.force, *moment)))
+        return coordinates(_cut(self.force, tolerance)), coordinates(_cut(moment, tolerance))
 
     def __str__(self) -> str:
         force, moment = self.sums_as_text
         return f"{self.name:<33} force {force}, moment about the origin {moment}"
 
 
-def _cut(values: tuple[float, ...], least: float) -> list[float]:
-    return [v if abs(v) > least else 0.0 for v in values]
+def _cut(values: tuple[float, ...], tolerance: float) -> list[float]:
+    return [v if abs(v) > tolerance else 0.0 for v in values]
 
 
 @dataclass(frozen=True)
@@ -327,8 +327,8 @@ def ingredients_of(problem: Problem) -> tuple[Ingredient, ...]:
     rows.extend(_multipliers(problem))
     rows.extend(_friction(problem))
     rows.append(_third_mode(problem, n_tips))
-    why = "the body is supported" if problem.supports else "none given; rigid motion is removed"
-    rows.append(Ingredient("supports", bool(problem.supports), why))
+    reason = "the body is supported" if problem.supports else "none given; rigid motion is removed"
+    rows.append(Ingredient("supports", bool(problem.supports), reason))
     rows.append(
         Ingredient(
             "enriched quadrature",
@@ -384,15 +384,15 @@ def _heaviside(n_tips: list[int]) -> Ingredient:
 def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     if not n_tips:
         return Ingredient("tip functions", False, "no cracks")
-    short = [
+    texts = [
         f"crack {c}: {front}"
         for c, crack in enumerate(problem.cracks)
         for front in short_fronts(crack, problem.mesh)
     ]
-    lost = "; ".join(short)
+    absence = "; ".join(texts)
     if not sum(n_tips):
         return Ingredient(
-            "tip functions", False, lost or "every crack cuts through: there is no tip"
+            "tip functions", False, absence or "every crack cuts through: there is no tip"
         )
     what_each = f"{problem.numerics.functions} functions"
     if problem.numerics.tip_basis is not None:
@@ -401,7 +401,7 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
     )
     reason = f"{sum(n_tips)} {_ENDS[problem.mesh.dim]}, {what_each}, {reach}"
-    return Ingredient("tip functions", True, reason + (f"; left out: {lost}" if lost else ""))
+    return Ingredient("tip functions", True, reason + (f"; left out: {absence}" if absence else ""))
 
 
 def _friction(problem: Problem) -> list[Ingredient]:
@@ -410,11 +410,11 @@ def _friction(problem: Problem) -> list[Ingredient]:
     if not coefficients:
         return []
     if problem.contact == "off":
-        why = "contact is switched off: crack faces that do not press do not rub"
-        return [Ingredient("friction", False, why)]
+        reason = "contact is switched off: crack faces that do not press do not rub"
+        return [Ingredient("friction", False, reason)]
     values = ", ".join(f"{mu:g}" for mu in coefficients)
-    why = f"Coulomb, mu = {values}, where crack faces press; load states in their order"
-    return [Ingredient("friction", True, why)]
+    reason = f"Coulomb, mu = {values}, where crack faces press; load states in their order"
+    return [Ingredient("friction", True, reason)]
 
 
 def _multipliers(problem: Problem) -> list[Ingredient]:
@@ -423,11 +423,11 @@ def _multipliers(problem: Problem) -> list[Ingredient]:
         "on": (True, "contact is switched on"),
         "auto": (False, "none until the crack faces of the open solution overlap"),
     }
-    used, reason = reasons[problem.contact]
-    if used and problem.numerics.contact_method is not None:
+    is_used, reason = reasons[problem.contact]
+    if is_used and problem.numerics.contact_method is not None:
         reason += f"; by {problem.numerics.contact_method.label}"
     return [
-        Ingredient(f"multipliers of crack {c}", used, reason) for c in range(len(problem.cracks))
+        Ingredient(f"multipliers of crack {c}", is_used, reason) for c in range(len(problem.cracks))
     ]
 
 

@@ -69,17 +69,25 @@ def report(
                 f"to {imbalance:.1e}",
             )
         rows.append(row)
-    shared = f"share one {engine.shared}" if n_states > 1 else f"one {engine.shared}"
-    rows.append(Ingredient("load states", True, f"{n_states}, {shared}"))
+    sharing = f"share one {engine.shared}" if n_states > 1 else f"one {engine.shared}"
+    rows.append(Ingredient("load states", True, f"{n_states}, {sharing}"))
     standard = model.space.n_nodes * d
     rows.append(
         Ingredient("standard functions", True, f"order {model.space.order}", unknowns=standard)
     )
-    for c, (given, placed) in enumerate(zip(problem.cracks, problem.placed, strict=True)):
-        met = sum(junction.crack == c for junction in problem.junctions)
-        moved = not given.placed and not np.array_equal(given.points, placed.points)
-        if moved and (placed.fronts is not None or 2 - placed.n_tips - met):
-            rows.append(Ingredient(f"mouths of crack {c}", True, _mouths(given, placed, met)))
+    for c, (given_crack, placed_crack) in enumerate(
+        zip(problem.cracks, problem.placed, strict=True)
+    ):
+        n_joints = sum(junction.crack == c for junction in problem.junctions)
+        is_moved = not given_crack.placed and not np.array_equal(
+            given_crack.points, placed_crack.points
+        )
+        if is_moved and (placed_crack.fronts is not None or 2 - placed_crack.n_tips - n_joints):
+            rows.append(
+                Ingredient(
+                    f"mouths of crack {c}", True, _mouths(given_crack, placed_crack, n_joints)
+                )
+            )
     if problem.junctions:
         where = [
             f"{junction.crack} on {junction.on} at {at(junction.x)}"
@@ -87,8 +95,8 @@ def report(
         ]
         rows.append(Ingredient("ends on other cracks", True, ", ".join(where)))
     if unbalanced is not None:
-        why = f"{unbalanced:.2%} of its energy is out of balance: it relaxes without any crack"
-        rows.append(Ingredient("initial stress", True, why))
+        reason = f"{unbalanced:.2%} of its energy is out of balance: it relaxes without any crack"
+        rows.append(Ingredient("initial stress", True, reason))
     if engine.reason:
         rows.append(Ingredient("linear solver", True, engine.reason))
     operations = {
@@ -104,25 +112,25 @@ def report(
     return Report(tuple(rows), operations)
 
 
-def _mouths(given: Crack, placed: Crack, met: int) -> str:
-    if placed.dim == 3:
+def _mouths(given_crack: Crack, placed_crack: Crack, n_joints: int) -> str:
+    if placed_crack.dim == 3:
         words = "sides refined to the size of the cells, prolonged to the outside where open"
-        present = {tuple(x) for x in placed.points.tolist()}
-        lost = sum(tuple(x) not in present for x in given.points.tolist())
-        return words + (f"; {lost} corner(s) of fronts rounded to two cells" if lost else "")
-    return f"{2 - placed.n_tips - met}, prolonged to one cell outside"
+        placed_points = {tuple(x) for x in placed_crack.points.tolist()}
+        n_lost = sum(tuple(x) not in placed_points for x in given_crack.points.tolist())
+        return words + (f"; {n_lost} corner(s) of fronts rounded to two cells" if n_lost else "")
+    return f"{2 - placed_crack.n_tips - n_joints}, prolonged to one cell outside"
 
 
 def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingredient:
     name = f"multipliers of crack {c}"
     m = contact.spaces[c]
     if m is not None:
-        why = (
+        reason = (
             "contact is switched on" if problem.contact == "on" else "the open crack faces overlap"
         )
         if problem.numerics.contact_method is not None:
-            why += f"; by {problem.numerics.contact_method.label}"
-        return Ingredient(name, True, why, unknowns=_n_multipliers(problem, [m]))
+            reason += f"; by {problem.numerics.contact_method.label}"
+        return Ingredient(name, True, reason, unknowns=_n_multipliers(problem, [m]))
     if problem.contact == "off":
         return Ingredient(name, False, "contact is switched off: crack faces may overlap")
     return Ingredient(name, False, "the crack faces stay apart in every load state")
@@ -185,12 +193,10 @@ def _resultant(model: System, name: str, f: Floats) -> Resultant:
     forces = f.reshape(-1, x.shape[1])[: len(x)]
     force = tuple(np.ascontiguousarray(forces.T).sum(axis=1).tolist())
     product = x.T @ forces
-    turning = product - product.T
+    spin = product - product.T
     if len(force) < 3:
-        return Resultant(name, force, float(turning[0, 1]))
-    return Resultant(
-        name, force, (float(turning[1, 2]), float(turning[2, 0]), float(turning[0, 1]))
-    )
+        return Resultant(name, force, float(spin[0, 1]))
+    return Resultant(name, force, (float(spin[1, 2]), float(spin[2, 0]), float(spin[0, 1])))
 
 
 # Magnitudes that no part of a machine has: slips of units, or loads left out.
@@ -271,8 +277,8 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
         alarms += [_stress(solution) for solution in solutions]
     worst: dict[str, Alarm] = {}
     for alarm in alarms:
-        before = worst.get(alarm.quantity)
-        if alarm.value > alarm.limit and (before is None or alarm.value > before.value):
+        worst_alarm = worst.get(alarm.quantity)
+        if alarm.value > alarm.limit and (worst_alarm is None or alarm.value > worst_alarm.value):
             worst[alarm.quantity] = alarm
     return list(worst.values())
 
@@ -281,9 +287,11 @@ def _displacement(solution: Solution) -> Alarm:
     """Largest displacement over the size of the body, of nodes without other functions."""
     space = solution.space
     n = space.mesh.n_points
-    plain = np.ones(n, dtype=bool)
-    plain[space.mesh.cells[space.signature != 0]] = False
-    u = np.linalg.norm(solution.coefficients[:n], axis=1) * (plain if plain.any() else 1)
+    is_plain_node = np.ones(n, dtype=bool)
+    is_plain_node[space.mesh.cells[space.signature != 0]] = False
+    u = np.linalg.norm(solution.coefficients[:n], axis=1) * (
+        is_plain_node if is_plain_node.any() else 1
+    )
     node = int(np.argmax(u))
     E = solution.problem.elasticity.largest_modulus
     remedy = f"is Young's modulus, {E:.4g}, in the unit of the loads, and are these as meant?"
@@ -307,18 +315,18 @@ def _stress(solution: Solution) -> Alarm:
     bary = np.full((len(cells), d + 1), 1 / (d + 1))
     sides = np.ones((len(cells), len(space.cuts)), dtype=np.int64)
     sigma = solution.stress_at(cells, bary, sides)
-    equivalent = von_mises(_in_space(solution, sigma, cells, bary))
+    von_mises_stress = von_mises(_in_space(solution, sigma, cells, bary))
     limit = elasticity.moduli_of_cells[cells] * _STRAINED
     if elasticity.knows_yield:
         limit = elasticity.yield_of_cells(cells)
-    order = np.argsort(equivalent / limit)
+    order = np.argsort(von_mises_stress / limit)
     volume = np.cumsum(space.mesh.volume[cells][order])
     k = int(order[np.searchsorted(volume, _SHARE * volume[-1])])
     place = f"at {coordinates(space.mesh.points[space.mesh.cells[cells[k]]].mean(axis=0))}"
     if elasticity.knows_yield:
         return Alarm(
             "the stress (von Mises) that 5 % of the body exceeds",
-            float(equivalent[k]),
+            float(von_mises_stress[k]),
             float(limit[k]),
             place,
             "the body yields away from cracks too, so that linear elasticity does not hold: is the "
@@ -326,7 +334,7 @@ def _stress(solution: Solution) -> Alarm:
         )
     return Alarm(
         "the strain (von Mises stress over Young's modulus) that 5 % of the body exceeds",
-        float(equivalent[k] / limit[k] * _STRAINED),
+        float(von_mises_stress[k] / limit[k] * _STRAINED),
         _STRAINED,
         place,
         "is Young's modulus in the unit of the loads, and are these as meant?",
@@ -337,10 +345,10 @@ def _in_space(solution: Solution, sigma: Floats, cells: Ints, bary: Floats) -> F
     """Stress in space `(q, 3, 3)` of that in a body `(q, d, d)`."""
     if sigma.shape[-1] == 3:
         return sigma
-    full = np.zeros((len(sigma), 3, 3))
-    full[:, :2, :2] = sigma
-    full[:, 2, 2] = solution.problem.elasticity.stress_across(sigma, cells, bary)
-    return full
+    stress = np.zeros((len(sigma), 3, 3))
+    stress[:, :2, :2] = sigma
+    stress[:, 2, 2] = solution.problem.elasticity.stress_across(sigma, cells, bary)
+    return stress
 
 
 __all__ = ["Alarm", "alarms_of_solutions", "has_units", "millimetre"]

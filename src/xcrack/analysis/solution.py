@@ -107,8 +107,10 @@ class Solution:
     def report(self) -> Report:
         """What was modelled, what was left out, and why; K beside that of a handbook, if given."""
         rows = tuple(
-            Ingredient(f"handbook K of crack {known.crack}", True, known.comparison(self))
-            for known in self.problem.handbook
+            Ingredient(
+                f"handbook K of crack {handbook_case.crack}", True, handbook_case.comparison(self)
+            )
+            for handbook_case in self.problem.handbook
         )
         return replace(self.summary, ingredients=self.summary.ingredients + rows)
 
@@ -125,7 +127,7 @@ class Solution:
     def scaled(self, factor: float) -> "Solution":
         """The solution under loads times a factor, where all is in proportion to them."""
         factor = float(numbers(factor, "scaled: factor", ()))
-        acting, level = self.acting, 1.0 if self.state is None else self.state
+        state_now, level = self.acting, 1.0 if self.state is None else self.state
         if not isinstance(level, Real) or any(load.is_steady for load in self.loads):
             raise ProblemError("only a solution of a factor on loads that are not steady scales.")
         contact = []
@@ -140,7 +142,9 @@ class Solution:
             self,
             state=factor * float(level),
             acting=LoadState(
-                acting.loads, tuple(factor * f for f in acting.factors), factor * acting.factor
+                state_now.loads,
+                tuple(factor * f for f in state_now.factors),
+                factor * state_now.factor,
             ),
             u=lock(factor * self.u),
             contact=tuple(contact),
@@ -175,9 +179,9 @@ class Solution:
 
         Faces that rub may hold slip without any load.
         """
-        rubs = any(each is not None and each.shear is not None for each in self.contact)
-        acts = self.factor or any(factor for _, factor in self.acting)
-        return not acts and not rubs
+        has_friction = any(each is not None and each.shear is not None for each in self.contact)
+        has_load = self.factor or any(factor for _, factor in self.acting)
+        return not has_load and not has_friction
 
     @property
     def n_dof(self) -> int:
@@ -225,9 +229,9 @@ class Solution:
         -------
         (n, d) array, length
         """
-        cell, bary, sides, single = self._points_and_sides(x, side)
+        cell, bary, sides, is_single = self._points_and_sides(x, side)
         u = self.at(cell, bary, sides)[0]
-        return u[0] if single else u
+        return u[0] if is_single else u
 
     def stress(self, x: ArrayLike, side: int = 0) -> Floats:
         """Stress at points `(n, d, d)`, initial stress included.
@@ -242,9 +246,9 @@ class Solution:
         -------
         (n, d, d) array, stress
         """
-        cell, bary, sides, single = self._points_and_sides(x, side)
+        cell, bary, sides, is_single = self._points_and_sides(x, side)
         sigma = self.stress_at(cell, bary, sides)
-        return sigma[0] if single else sigma
+        return sigma[0] if is_single else sigma
 
     def stress_at(self, cell: Ints, bary: Floats, side: Ints) -> Floats:
         """Stress at points given by cell `(q, d, d)`; arguments as of `at`."""
@@ -256,8 +260,8 @@ class Solution:
         """Sum of the initial stresses at points `(q, d)`: `(q, d, d)`."""
         x = numbers(x, "initial_stress: x", (None, self.space.dim))
         if self.problem.elasticity.is_uniform:
-            nowhere = np.zeros(len(x), dtype=np.int64)  # the stress does not depend on the cell
-            return initial_stress_at(self, nowhere, np.zeros((len(x), 0)), x)
+            no_cells = np.zeros(len(x), dtype=np.int64)  # the stress does not depend on the cell
+            return initial_stress_at(self, no_cells, np.zeros((len(x), 0)), x)
         cell = cells_at(self.space.mesh, x)
         return initial_stress_at(self, cell, barycentric(self.space.mesh, cell, x), x)
 
@@ -308,18 +312,18 @@ class Solution:
         return cell, bary, side
 
     def _points_and_sides(self, x: ArrayLike, side: int) -> tuple[Ints, Floats, Ints, bool]:
-        points, single = self._points(x)
+        points, is_single = self._points(x)
         if type(side) is bool or not isinstance(side, Real) or side not in (0, 1, -1):
             raise ProblemError(f"side = {value_text(side)}: give 1 (lip +), -1 (lip -) or 0.")
         cell, bary = locate(self.space.mesh, points)
         if (cell < 0).any():
-            outside = points[np.argmax(cell < 0)]
+            first_outside = points[np.argmax(cell < 0)]
             raise GeometryError(
-                f"{np.round(outside, 9).tolist()} lies outside the body ({int((cell < 0).sum())} "
-                "such points), where a curved boundary is a polygon: choose points by "
-                "solution.inside(x)."
+                f"{np.round(first_outside, 9).tolist()} lies outside the body "
+                f"({int((cell < 0).sum())} such points), where a curved boundary is a polygon: "
+                "choose points by solution.inside(x)."
             )
-        return cell, bary, sides_of(self.space, cell, bary, side), single
+        return cell, bary, sides_of(self.space, cell, bary, side), is_single
 
 
 def mean_stress(solutions: Sequence[Solution]) -> float:
@@ -399,7 +403,7 @@ def sides_of(space: FunctionSpace, cell: Ints, bary: Floats, lip: int) -> Ints:
 
 
 def initial_stress_at(
-    solution: Solution, cell: Ints, bary: Floats, x: Floats | None = None, exact: bool = False
+    solution: Solution, cell: Ints, bary: Floats, x: Floats | None = None, is_exact: bool = False
 ) -> Floats:
     """Sum of the initial stresses at points given by cell, or besides by place `(q, d, d)`.
 
@@ -410,7 +414,7 @@ def initial_stress_at(
         if "initial_stress" in load.acts:
             x = position(solution.space, cell, bary) if x is None else x
             elasticity = solution.problem.elasticity
-            total = total + factor * elasticity.initial_stress(load, x, cell, bary, exact)
+            total = total + factor * elasticity.initial_stress(load, x, cell, bary, is_exact)
     return total
 
 

@@ -80,21 +80,21 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     sigma = np.zeros((len(x), space.dim, space.dim))
     for load in stresses:
         sigma = sigma + elasticity.initial_stress(load, x, *where)
-    stored = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *where))
-    if stored <= 0:
+    energy = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *where))
+    if energy <= 0:
         return None
-    free = ~model.known.is_fixed[:n]
+    free_forces = ~model.known.is_fixed[:n]
     vector = sum(load_vector(space, elasticity, load, ())[:n] for load in stresses)
-    f = np.where(free, vector, 0.0)
+    f = np.where(free_forces, vector, 0.0)
     matrix = model.bulk.matrix
-    keep = sp.diags(free.astype(float))
-    scale = np.where(free, 1 / matrix.diagonal(), 0.0)
+    keep = sp.diags(free_forces.astype(float))
+    scale = np.where(free_forces, 1 / matrix.diagonal(), 0.0)
     operator = LinearOperator(
         (n, n), matvec=lambda v: keep @ body_forces(matrix, keep @ v), dtype=float
     )
-    smooth = LinearOperator((n, n), matvec=lambda v: scale * v, dtype=float)
-    u = cg(operator, f, rtol=_RESIDUAL, maxiter=_MOST, M=smooth)[0]
-    return float(np.clip(f @ u / stored, 0.0, 1.0))
+    scaling = LinearOperator((n, n), matvec=lambda v: scale * v, dtype=float)
+    u = cg(operator, f, rtol=_RESIDUAL, maxiter=_MOST, M=scaling)[0]
+    return float(np.clip(f @ u / energy, 0.0, 1.0))
 
 
 _SOLVER = (
@@ -163,21 +163,21 @@ def solve_states(
     reuse: SolverState | None = None,
     solver: Solver | None = None,
     error: bool = False,
-    repeated: bool = False,
+    is_repeated: bool = False,
 ) -> list[Solution]:
     """Solve all load states; `reuse` of an earlier solution in the same mesh saves work.
 
     Give `SolverState()` at the first of several solves in one mesh: what serves the next is then
-    kept. With `error` the factor stays with the solutions. With `repeated` the states are a cycle:
-    where faces rub it goes on until slip returns, from what `reuse` left behind.
+    kept. With `error` the factor stays with the solutions. With `is_repeated` the states are a
+    cycle: where faces rub it goes on until slip returns, from what `reuse` left behind.
     """
     if not len(states):
         raise ProblemError("states is empty: give at least one load state, or none at all.")
     with threads(problem.numerics.threads):
         if solver is not None:  # a user's solver may use threads of BLAS
-            return _solve_states(problem, states, reuse, solver, error, repeated)
+            return _solve_states(problem, states, reuse, solver, error, is_repeated)
         with one_blas_thread():  # entered anew by every factorisation, which then costs nothing
-            return _solve_states(problem, states, reuse, solver, error, repeated)
+            return _solve_states(problem, states, reuse, solver, error, is_repeated)
 
 
 def _solve_states(
@@ -186,40 +186,46 @@ def _solve_states(
     reuse: SolverState | None,
     solver: Solver | None,
     error: bool,
-    repeated: bool,
+    is_repeated: bool,
 ) -> list[Solution]:
-    old = None if reuse is None else reuse.bulk
-    if solver is None and (old is None or old.mesh is not problem.mesh):
+    old_bulk = None if reuse is None else reuse.bulk
+    if solver is None and (old_bulk is None or old_bulk.mesh is not problem.mesh):
         check_memory(problem, len(states))
-    model = build(problem, old)
+    model = build(problem, old_bulk)
     vectors = mesh_loads(model.space, model.bulk.loads)
     cases = [_case(problem, model, state, vectors) for state in states]
-    fixed = model.known.is_fixed.copy()
-    free = _fixed_unknowns(model, fixed)
-    motion = free_motion(model.space, fixed, free[1])
-    engine = _engine(problem, model, fixed, motion, solver, reuse)
+    is_fixed = model.known.is_fixed.copy()
+    free_motions = _fixed_unknowns(model, is_fixed)
+    motion = free_motion(model.space, is_fixed, free_motions[1])
+    engine = _engine(problem, model, is_fixed, motion, solver, reuse)
     f, imbalance = balanced_loads(model.space, motion, np.stack([case.f for case in cases], axis=1))
     u_imposed = np.stack([case.known for case in cases], axis=1)
-    acting = [case.acting for case in cases]
+    load_states = [case.acting for case in cases]
     start = reuse or SolverState()
-    pressed = solve_contact(problem, model, engine, f, u_imposed, start, acting, repeated)
-    u = pressed.u
+    contact_solution = solve_contact(
+        problem, model, engine, f, u_imposed, start, load_states, is_repeated
+    )
+    u = contact_solution.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
     loads: tuple[MeshLoad, ...] = ()
     if reuse is not None:  # else there is no next step
-        acted = {id(load): load for case in cases for load in case.acting.loads}.values()
-        pairs = [(load, vectors[id(load)]) for load in acted]
+        all_loads = {id(load): load for case in cases for load in case.acting.loads}.values()
+        pairs = [(load, vectors[id(load)]) for load in all_loads]
         loads = on_mesh(model.space, pairs, model.bulk.loads)
-    left = replace(pressed.closed_sets(), bulk=replace(model.bulk, loads=loads, free=free))
-    if pressed.rubbing:
-        left = replace(left, slip=slip_of(model, pressed.rubbing, u[:, -1]))
-    handed_on = engine.handed_on(left)
-    factored = FactoredSolution(model, engine, motion, pressed) if error else None
+    end_state = replace(
+        contact_solution.closed_sets(), bulk=replace(model.bulk, loads=loads, free=free_motions)
+    )
+    if contact_solution.rubbing:
+        end_state = replace(end_state, slip=slip_of(model, contact_solution.rubbing, u[:, -1]))
+    handed_on = engine.handed_on(end_state)
+    factored = FactoredSolution(model, engine, motion, contact_solution) if error else None
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
     first = cases[0].acting.loads
-    unbalanced = None if reuse is not None else out_of_balance(problem, model, first)
-    summary = report(problem, model, engine, pressed, motion, imbalance, len(states), unbalanced)
+    unbalanced_share = None if reuse is not None else out_of_balance(problem, model, first)
+    summary = report(
+        problem, model, engine, contact_solution, motion, imbalance, len(states), unbalanced_share
+    )
     solutions = []
     inner = times(engine.matrix, u)
     for k, (state, case) in enumerate(zip(states, cases, strict=True)):
@@ -233,31 +239,31 @@ def _solve_states(
                 space=model.space,
                 u=lock(np.ascontiguousarray(u[:, k])),
                 lips=model.lips,
-                contact=contact_of(model, pressed, u[:, k], k),
+                contact=contact_of(model, contact_solution, u[:, k], k),
                 energy=0.5 * float(u[:, k] @ forces),
                 summary=replace(summary, resultants=rows),
                 reuse=handed_on,
                 number=k,
                 factored=factored,
-                dissipated=pressed.dissipated[k] if pressed.dissipated else 0.0,
+                dissipated=contact_solution.dissipated[k] if contact_solution.dissipated else 0.0,
             )
         )
     return solutions
 
 
-def _fixed_unknowns(model: System, fixed: Bools) -> tuple[Bools, Floats]:
+def _fixed_unknowns(model: System, is_fixed: Bools) -> tuple[Bools, Floats]:
     """Fixed standard unknowns and the rigid motions left: those of the last solve, or new ones."""
-    space, free = model.space, model.bulk.free
-    standard = fixed[: space.n_nodes * space.dim]
-    if free is not None and np.array_equal(free[0], standard):
-        return free
+    space, earlier_free = model.space, model.bulk.free
+    standard = is_fixed[: space.n_nodes * space.dim]
+    if earlier_free is not None and np.array_equal(earlier_free[0], standard):
+        return earlier_free
     return lock(standard.copy()), lock(free_modes(space, standard))
 
 
 def _engine(
     problem: Problem,
     model: System,
-    fixed: Bools,
+    is_fixed: Bools,
     motion: Motion,
     solver: Solver | None,
     reuse: SolverState | None,
@@ -271,17 +277,17 @@ def _engine(
             space_,
             model.parts if by_parts else model.stiffness,
             model.bulk,
-            fixed,
+            is_fixed,
             None if reuse is None else reuse.hierarchy,
             motion.modes,
             None if basis is None else partial(basis.columns, space_, problem.elasticity.material),
             next_to_enriched(space_) if by_parts else None,
         )
-    fixed[motion.pins] = True
+    is_fixed[motion.pins] = True
     return system(
         space_,
         model.stiffness,
-        fixed,
+        is_fixed,
         problem.numerics,
         solver,
         problem.elasticity.material,
@@ -301,27 +307,31 @@ class LoadCase:
 
 def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats]) -> LoadCase:
     """A load state; states that share loads integrate them once."""
-    acting = problem.state(state)
+    load_state = problem.state(state)
     parts = []
-    new_loads = list({id(load): load for load, _ in acting if id(load) not in vectors}.values())
+    new_loads = list({id(load): load for load, _ in load_state if id(load) not in vectors}.values())
     each = load_vectors(model.space, problem.elasticity, new_loads, model.lips)
     vectors.update(zip(map(id, new_loads), each, strict=True))
-    for load, factor in acting:
+    for load, factor in load_state:
         vector = vectors[id(load)]
         parts.append(vector if factor == 1 else factor * vector)
     f = sum(parts, np.zeros(model.space.n_dof))
-    u_imposed = acting.factor * model.known.value
-    moved = [(load, factor) for load, factor in acting if "support" in load.acts]
-    for factor in sorted({factor for _, factor in moved}):
-        new = known_unknowns(model.space, [cast(Support, x) for x, f in moved if f == factor])
-        u_imposed = np.where(new.is_fixed & model.known.is_fixed, factor * new.value, u_imposed)
+    u_imposed = load_state.factor * model.known.value
+    moved_supports = [(load, factor) for load, factor in load_state if "support" in load.acts]
+    for factor in sorted({factor for _, factor in moved_supports}):
+        imposed_values = known_unknowns(
+            model.space, [cast(Support, x) for x, f in moved_supports if f == factor]
+        )
+        u_imposed = np.where(
+            imposed_values.is_fixed & model.known.is_fixed, factor * imposed_values.value, u_imposed
+        )
     largest = max(np.abs(f).max(initial=0.0), np.abs(u_imposed).max(initial=0.0))
     if not largest < _LARGEST:
         raise ProblemError(
             f"the loads of state {value_text(state)} give forces or displacements of up to "
             f"{largest:.3g}, whose squares are no numbers: take other units."
         )
-    return LoadCase(acting, f, tuple(parts), u_imposed)
+    return LoadCase(load_state, f, tuple(parts), u_imposed)
 
 
 __all__ = []

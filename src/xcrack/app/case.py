@@ -191,8 +191,8 @@ def _problem(root: Table) -> Problem:
     if "material" in root:
         scene["material"] = _material(root.table("material"))
     scene |= {
-        name: [values.value_of_table(table, allowed) for table in root.tables(name)]
-        for name, allowed in (
+        name: [values.value_of_table(table, load_names) for table in root.tables(name)]
+        for name, load_names in (
             ("cracks", values.CRACKS),
             ("supports", values.makers_of(Support)),
             ("loads", values.makers_of(Load)),
@@ -201,10 +201,10 @@ def _problem(root: Table) -> Problem:
         if name in root
     }  # fmt: skip
     scene["numerics"] = _numerics(root.table("numerics"))
-    solving = root.table("solve")
-    solving.known((*_CHOICES, "states", *_SOLVING))
-    chosen = {name: values.argument_of(solving, name, Problem) for name in _CHOICES
-              if name in solving}  # fmt: skip
+    solve_table = root.table("solve")
+    solve_table.known((*_CHOICES, "states", *_SOLVING))
+    chosen = {name: values.argument_of(solve_table, name, Problem) for name in _CHOICES
+              if name in solve_table}  # fmt: skip
     (body,) = given_bodies
     table = root.table(body)
     if body == "mesh":
@@ -265,24 +265,24 @@ def _mesh(table: Table) -> Mesh:
 def _changed_mesh(table: Table, mesh: Mesh) -> Mesh:
     """The mesh refined, with parts of its facet sets, and cell sets by boxes."""
     if "refine" in table:
-        listed = isinstance(table.content["refine"], list)
-        for each in table.tables("refine") if listed else [table.table("refine")]:
-            mesh = values.called_with(each, refine, given={"mesh": mesh})
+        is_list = isinstance(table.content["refine"], list)
+        for each in table.tables("refine") if is_list else [table.table("refine")]:
+            mesh = values.called_with(each, refine, arguments={"mesh": mesh})
     for each in table.tables("parts"):
-        mesh = values.called_with(each, part, given={"mesh": mesh})
+        mesh = values.called_with(each, part, arguments={"mesh": mesh})
     if "cell_sets" in table:
         boxes = table.table("cell_sets")
         try:
-            inside = {
+            mesh_tables = {
                 name: selector(boxes.value(name, LENGTH), mesh.dim, f"cell set {name!r}")
                 for name, box in boxes.content.items()
                 if box != _REST
             }
-            others = list(inside.values())
+            others = list(mesh_tables.values())
             for name in boxes.content:
-                if name not in inside:
-                    inside[name] = partial(_beside_all, others)
-            mesh = mesh.with_cell_sets(inside)
+                if name not in mesh_tables:
+                    mesh_tables[name] = partial(_beside_all, others)
+            mesh = mesh.with_cell_sets(mesh_tables)
         except XcrackError as error:
             boxes.wrap(error)
     return mesh
@@ -336,8 +336,8 @@ def _criterion(table: Table) -> Any:
     if kind not in values.CRITERIA:
         chosen.refuse("kind", f"known are {', '.join(values.CRITERIA)}.")
     criterion_of_kind = values.CRITERIA[kind]
-    named = [name for name in arguments_of(criterion_of_kind) if name not in ("K", "nu")]
-    chosen.known(["kind", *named], f" of {kind!r}")
+    argument_names = [name for name in arguments_of(criterion_of_kind) if name not in ("K", "nu")]
+    chosen.known(["kind", *argument_names], f" of {kind!r}")
     choices = {}
     for name in chosen.content:
         if name != "kind":
@@ -360,26 +360,26 @@ def _growth(table: Table) -> Mapping[str, Any]:
     table.known(("law", "criterion", "cycle", "spectrum", "da", "until", *options))
     if "law" not in table:
         table.refuse("", "the key 'law' is missing: give it.")
-    given = {
+    arguments = {
         name: values.argument_of(table, name, GrowthRule)
         for name in table.content
         if name not in _TABLES and name not in ("solver", "until")
     }
     if "solver" in table:
-        given["solver"] = _solver(table)
+        arguments["solver"] = _solver(table)
     if "retardation" in table:
-        given["retardation"] = retardation_of(table.table("retardation"))
+        arguments["retardation"] = retardation_of(table.table("retardation"))
     if "load_program" in table:
-        given["load_program"] = values.value_of_table(
+        arguments["load_program"] = values.value_of_table(
             table.table("load_program"), values.makers_of(LoadProgram)
         )
     if "link_up" in table:
-        given["link_up"] = values.called_with(table.table("link_up"), plastic_zone)
+        arguments["link_up"] = values.called_with(table.table("link_up"), plastic_zone)
     return MappingProxyType({
         "law": _law(table.table("law")),
         "criterion": _criterion(table),
         "cycle": loading(table),
-        **given,
+        **arguments,
     })  # fmt: skip
 
 
@@ -406,15 +406,17 @@ def _solver(table: Table) -> Any:
 def _solving(table: Table) -> Mapping[str, Any]:
     """Arguments of `solve`, or with a tolerance of `adapt`, beside problem and states."""
     maker = adapt if "tolerance" in table else solve
-    given = {}
+    arguments = {}
     for name in _SOLVING:
         if name not in table:
             continue
         if name not in arguments_of(maker):
             other = "with a tolerance" if maker is adapt else "without a tolerance"
             table.refuse(name, f"it has no meaning {other}: leave one of them out.")
-        given[name] = _solver(table) if name == "solver" else values.argument_of(table, name, maker)
-    return MappingProxyType(given)
+        arguments[name] = (
+            _solver(table) if name == "solver" else values.argument_of(table, name, maker)
+        )
+    return MappingProxyType(arguments)
 
 
 def _texts(table: Table, name: str) -> list[str]:

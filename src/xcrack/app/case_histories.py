@@ -80,46 +80,55 @@ def loading(table: Table) -> Cycle | Spectrum:
             cycle.wrap(error)
     if "cycle" in table:
         table.refuse("spectrum", "give cycle or spectrum, not both.")
-    given = table.table("spectrum")
-    kind = given.text("kind", next((name for name in _HISTORIES if name in given), "factors"))
+    spectrum_table = table.table("spectrum")
+    kind = spectrum_table.text(
+        "kind", next((name for name in _HISTORIES if name in spectrum_table), "factors")
+    )
     if kind not in _HISTORIES:
-        given.refuse("kind", f"{kind!r:.40} is not known: known are {', '.join(_HISTORIES)}.")
+        spectrum_table.refuse(
+            "kind", f"{kind!r:.40} is not known: known are {', '.join(_HISTORIES)}."
+        )
     maker = _HISTORIES[kind]
     names = list(arguments_of(maker)) if maker else [kind, *(["sequence"] * (kind == "states"))]
-    given.known(["kind", *names, *_CHOICES], f" of {kind!r}")
+    spectrum_table.known(["kind", *names, *_CHOICES], f" of {kind!r}")
     choices: dict[str, Any] = {
         name: (
-            tuple(value_of_table(load, makers_of(Load)) for load in given.tables(name))
+            tuple(value_of_table(load, makers_of(Load)) for load in spectrum_table.tables(name))
             if name == "steady"
-            else argument_of(given, name, Spectrum)
+            else argument_of(spectrum_table, name, Spectrum)
         )
         for name in _CHOICES
-        if name in given
+        if name in spectrum_table
     }
     try:
         if maker is not None:
-            content = {n: v for n, v in given.content.items() if n not in _CHOICES and n != "kind"}
-            return replace(called_with(Table(given.source, given.key, content), maker), **choices)
+            content = {
+                n: v for n, v in spectrum_table.content.items() if n not in _CHOICES and n != "kind"
+            }
+            return replace(
+                called_with(Table(spectrum_table.source, spectrum_table.key, content), maker),
+                **choices,
+            )
         for name in names:
-            if name not in given:
-                given.refuse("", f"the key {name!r} of {kind!r} is missing: give it.")
+            if name not in spectrum_table:
+                spectrum_table.refuse("", f"the key {name!r} of {kind!r} is missing: give it.")
         forms: dict[str, Any] = {
-            name: load_states(given, name)
+            name: load_states(spectrum_table, name)
             if name == "states"
-            else argument_of(given, name, Spectrum)
+            else argument_of(spectrum_table, name, Spectrum)
             for name in names
         }
         return Spectrum(**forms, **choices)
     except XcrackError as error:
-        if str(error).startswith(str(given.source.path)):
+        if str(error).startswith(str(spectrum_table.source.path)):
             raise
-        given.wrap(error)
+        spectrum_table.wrap(error)
 
 
 def retardation_of(table: Table) -> Retardation | dict[str, Retardation]:
     """The model of a table, whose zone is a table too; or by tables one for each material."""
-    several = table.content and all(isinstance(each, dict) for each in table.content.values())
-    if several and "zone" not in table:
+    is_by_set = table.content and all(isinstance(each, dict) for each in table.content.values())
+    if is_by_set and "zone" not in table:
         return {name: _model(table.table(name)) for name in table.content}
     return _model(table)
 
@@ -190,23 +199,23 @@ def _check_points(x: Floats, y: Floats, what: str, other: str) -> None:
 def _scatter(table: Table) -> Scatter:
     """What varies, by its name."""
     table.known(arguments_of(Scatter))
-    given: dict[str, Any] = {
+    arguments: dict[str, Any] = {
         name: _distribution(table.table(name), name)
         for name in table.content
         if name not in ("constants", "correlation")
     }
     constants = table.table("constants")
     if "constants" in table:
-        given["constants"] = {
+        arguments["constants"] = {
             name: _distribution(constants.table(name), name) for name in constants.content
         }
     if "correlation" in table:
         rows = table.content["correlation"]
         if not isinstance(rows, list) or not all(isinstance(r, list) and len(r) == 3 for r in rows):
             table.refuse("correlation", 'give a list of pairs and numbers, [["C", "m", -0.98]].')
-        given["correlation"] = {(one, other): rho for one, other, rho in rows}
+        arguments["correlation"] = {(one, other): rho for one, other, rho in rows}
     try:
-        return Scatter(**given)
+        return Scatter(**arguments)
     except XcrackError as error:
         table.wrap(error)
 
@@ -241,16 +250,16 @@ def life_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mappin
     for name in ("scatter", "seed"):
         if name not in table:
             table.refuse("", f"the key {name!r} is missing: give it.")
-    given = {name: argument_of(table, name, life) for name in table.content
+    arguments = {name: argument_of(table, name, life) for name in table.content
              if name not in ("scatter", "nu")}  # fmt: skip
-    given |= {"scatter": _scatter(table.table("scatter")), "law": growth["law"]}
+    arguments |= {"scatter": _scatter(table.table("scatter")), "law": growth["law"]}
     if isinstance(growth["law"], Mapping):
-        given["law"] = None  # laws by material: what needs one is refused by `life`
+        arguments["law"] = None  # laws by material: what needs one is refused by `life`
     if isinstance(growth["cycle"], Spectrum):
-        given |= {"spectrum": growth["cycle"], "criterion": growth["criterion"],
+        arguments |= {"spectrum": growth["cycle"], "criterion": growth["criterion"],
                   "nu": _poisson(table, problem)}  # fmt: skip
-        given |= {name: growth[name] for name in ("threshold", "retardation") if name in growth}
-    return MappingProxyType(given)
+        arguments |= {name: growth[name] for name in ("threshold", "retardation") if name in growth}
+    return MappingProxyType(arguments)
 
 
 def retarded_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -264,13 +273,13 @@ def retarded_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
     if not isinstance(growth["cycle"], Spectrum):
         table.refuse("", "overloads are of a spectrum: give [growth.spectrum] in place of a cycle.")
     names = [name for name in arguments_of(retarded) if name not in (*_OF_RUN, "model")]
-    given = {name: argument_of(table, name, retarded) for name in names if name in table}
+    arguments = {name: argument_of(table, name, retarded) for name in names if name in table}
     content = {name: value for name, value in table.content.items() if name not in names}
-    given["model"] = retardation_of(Table(table.source, table.key, content))
-    if isinstance(given["model"], dict):
+    arguments["model"] = retardation_of(Table(table.source, table.key, content))
+    if isinstance(arguments["model"], dict):
         table.refuse("", "it is of one model: give kind, its numbers and zone.")
-    given |= {"nu": _poisson(table, problem), "law": growth["law"], "spectrum": growth["cycle"]}
-    return MappingProxyType(given)
+    arguments |= {"nu": _poisson(table, problem), "law": growth["law"], "spectrum": growth["cycle"]}
+    return MappingProxyType(arguments)
 
 
 def inspection_of(table: Table) -> Mapping[str, Any]:
@@ -282,12 +291,14 @@ def inspection_of(table: Table) -> Mapping[str, Any]:
         A wrong key, unit or value; with file and line.
     """
     table.known([name for name in arguments_of(inspection) if name not in _OF_RUN])
-    given = {name: argument_of(table, name, inspection) for name in table.content if name != "pod"}
+    arguments = {
+        name: argument_of(table, name, inspection) for name in table.content if name != "pod"
+    }
     if "pod" in table:
-        given["pod"] = called_with(table.table("pod"), logistic_pod)
-    if ("a_detect" in given) == ("interval" in given):
+        arguments["pod"] = called_with(table.table("pod"), logistic_pod)
+    if ("a_detect" in arguments) == ("interval" in arguments):
         table.refuse("", "give a_detect or interval, and not both.")
-    return MappingProxyType(given)
+    return MappingProxyType(arguments)
 
 
 def strength_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -300,22 +311,22 @@ def strength_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
     """
     table.known([name for name in arguments_of(residual_strength) if name not in _OF_RUN])
     material = problem.elasticity.material
-    given: dict[str, Any] = {"nu": _poisson(table, problem)}
+    arguments: dict[str, Any] = {"nu": _poisson(table, problem)}
     of_body = {"K_c": growth.get("K_c", material.K_c), "yield_stress": material.yield_stress}
-    for name, known in of_body.items():
+    for name, value_of_body in of_body.items():
         if name in table:
-            given[name] = argument_of(table, name, residual_strength)
-        elif known is not None:
-            given[name] = known
-    if "K_c" not in given:
+            arguments[name] = argument_of(table, name, residual_strength)
+        elif value_of_body is not None:
+            arguments[name] = value_of_body
+    if "K_c" not in arguments:
         table.refuse(
             "", "the key 'K_c' is missing, and neither growth nor material have it: give it."
         )
     makers = {"resistance": ResistanceCurve, "collapse": CollapseFactor, "line": assessment_line}
     for name, maker in makers.items():
         if name in table:
-            given[name] = called_with(table.table(name), maker)
-    return MappingProxyType(given)
+            arguments[name] = called_with(table.table(name), maker)
+    return MappingProxyType(arguments)
 
 
 __all__ = [

@@ -87,10 +87,20 @@ def run(
     if problem is not None:
         if resumed:
             raise ProblemError("run: resumed belongs to a case file: a run in a folder goes on.")
-        given: dict[str, Any] = {"until": until, "keep_solutions": keep_solutions}
-        return _run_in(path, (problem, law, criterion, cycle, da), given, overwrite, options)
-    growing = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, "until": until}
-    surplus = sorted([*options, *(name for name, value in growing.items() if value is not None)])
+        options_of_collect: dict[str, Any] = {"until": until, "keep_solutions": keep_solutions}
+        return _run_in(
+            path, (problem, law, criterion, cycle, da), options_of_collect, overwrite, options
+        )
+    growth_arguments = {
+        "law": law,
+        "criterion": criterion,
+        "cycle": cycle,
+        "da": da,
+        "until": until,
+    }
+    surplus = sorted(
+        [*options, *(name for name, value in growth_arguments.items() if value is not None)]
+    )
     if surplus or keep_solutions is not True:
         raise ProblemError(
             f"run: {', '.join(surplus or ['keep_solutions'])} without a problem: give the problem "
@@ -102,7 +112,7 @@ def run(
 def _run_in(
     path: str | PathLike[str],
     scene: tuple[Any, ...],
-    given: dict[str, Any],
+    options_of_collect: dict[str, Any],
     overwrite: bool,
     options: GrowthOptions,
 ) -> History:
@@ -115,11 +125,11 @@ def _run_in(
                 f"run: path = {str(folder)!r} is a file: a run needs a folder of its own, and a "
                 "case file is given alone."
             )
-        begun = folder.is_dir() and any(folder.iterdir())
-    if overwrite or not begun:
+        has_begun = folder.is_dir() and any(folder.iterdir())
+    if overwrite or not has_begun:
         steps = grow(problem, law, criterion, cycle, da, **options)
-        return collect(steps, folder, overwrite=overwrite, **given)
-    return resume(folder, problem, law, criterion, cycle, da, **given, **options)
+        return collect(steps, folder, overwrite=overwrite, **options_of_collect)
+    return resume(folder, problem, law, criterion, cycle, da, **options_of_collect, **options)
 
 
 def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> Any:
@@ -134,7 +144,7 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
             write(solution, case.folder / ("solution" if len(solutions) == 1 else f"state_{k}"))
     else:
         steps = case.folder / STEPS
-        result = growth_of_case(case, steps, resumed=resumed, overwrite=overwrite,
+        result = growth_of_case(case, steps, is_resumed=resumed, overwrite=overwrite,
                                 keep_solutions=case.keep_solutions)  # fmt: skip
         result.write(case.folder)
         _write_retarded(case, result)
@@ -160,24 +170,24 @@ def _assessment_of(case: CaseFile, result: Any) -> dict[str, Any]:
     if case.growth is None:
         return {}
     cycle = case.growth["cycle"]
-    made: dict[str, Any] = {"spectrum": cycle if isinstance(cycle, Spectrum) else None}
+    arguments: dict[str, Any] = {"spectrum": cycle if isinstance(cycle, Spectrum) else None}
     if case.life is not None:
-        made["life"] = life(result, **case.life)
+        arguments["life"] = life(result, **case.life)
     if case.inspection is not None:
-        made["inspection"] = inspection(result, **case.inspection)
+        arguments["inspection"] = inspection(result, **case.inspection)
     if case.strength is not None:
-        made["strength"] = residual_strength(result, **case.strength)
-    return made
+        arguments["strength"] = residual_strength(result, **case.strength)
+    return arguments
 
 
 def retarded_lives(case: CaseFile, history: History) -> dict[str, Retarded]:
     """Growth along the path of a run with each model of retardation, by what tells them apart."""
     results: dict[str, Retarded] = {}
-    for given in case.retarded:
-        kind = type(given["model"]).__name__
+    for arguments in case.retarded:
+        kind = type(arguments["model"]).__name__
         names = chain([kind], (f"{kind}_{k}" for k in count(2)))
         name = next(each for each in names if each not in results)
-        results[name] = retarded(history, **given)
+        results[name] = retarded(history, **arguments)
     return results
 
 
@@ -203,20 +213,20 @@ def growth_of_case(
     case: CaseFile,
     folder: Path,
     *,
-    resumed: bool,
+    is_resumed: bool,
     overwrite: bool = False,
     keep_solutions: bool = True,
     **options: Any,
 ) -> History:
     """The growth of a case, stored in a folder; gone on with where it has begun there."""
-    given = {**(case.growth or {}), **options}
-    storing: dict[str, Any] = {"until": case.until, "keep_solutions": keep_solutions}
-    if resumed and _has_begun(folder):
-        law, criterion, cycle = (given.pop(name) for name in ("law", "criterion", "cycle"))
-        return resume(folder, case.problem, law, criterion, cycle, given.pop("da", None),
-                      **storing, **given)  # fmt: skip
-    steps = grow(case.problem, **given)
-    return collect(steps, folder, overwrite=overwrite, **storing)
+    growth_options = {**(case.growth or {}), **options}
+    storage_options: dict[str, Any] = {"until": case.until, "keep_solutions": keep_solutions}
+    if is_resumed and _has_begun(folder):
+        law, criterion, cycle = (growth_options.pop(name) for name in ("law", "criterion", "cycle"))
+        return resume(folder, case.problem, law, criterion, cycle, growth_options.pop("da", None),
+                      **storage_options, **growth_options)  # fmt: skip
+    steps = grow(case.problem, **growth_options)
+    return collect(steps, folder, overwrite=overwrite, **storage_options)
 
 
 def _has_begun(folder: Path) -> bool:

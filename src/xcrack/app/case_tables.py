@@ -98,18 +98,20 @@ class Table:
         except ProblemError as error:
             self.refuse(name, f"{error}{hint}")
 
-    def _in_file_units(self, value: Any, dimension: Dimension | None, within: bool = False) -> Any:
+    def _in_file_units(
+        self, value: Any, dimension: Dimension | None, is_component: bool = False
+    ) -> Any:
         if isinstance(value, list):
             return [self._in_file_units(item, dimension, True) for item in value]
         if isinstance(value, dict):
             return {key: self._in_file_units(item, dimension) for key, item in value.items()}
-        if value == FREE and within:
+        if value == FREE and is_component:
             return None
         if isinstance(value, str) and dimension is not None:
             return self.source.units.number(value, dimension)
         return value
 
-    def wrap(self, error: XcrackError | TypeError, about: str = "") -> NoReturn:
+    def wrap(self, error: XcrackError | TypeError, key_of_error: str = "") -> NoReturn:
         """Raise an error of a function that this table was given to, with file and line.
 
         It is about a key, where that is known; else about the first that it names.
@@ -120,7 +122,7 @@ class Table:
             for name in self.content
             if (match := re.search(rf"\b{re.escape(name)}\b", text))
         }
-        key = about or min(places, key=places.__getitem__, default="")
+        key = key_of_error or min(places, key=places.__getitem__, default="")
         place = (*self.key, key) if key else self.key
         kind = type(error) if isinstance(error, XcrackError) else ProblemError
         line = self.source.line(place)
@@ -191,8 +193,8 @@ def _words_of_toml(reason: str) -> str:
         if match := re.match(pattern, reason):
             name = match[1].replace("', '", ".") if match.groups() else ""
             return words.format(name)
-    plain = re.sub(r" \(at .*?\)$", "", reason)
-    return f"{plain}; texts stand in quotes, lists in [ ]: write it so"
+    message = re.sub(r" \(at .*?\)$", "", reason)
+    return f"{message}; texts stand in quotes, lists in [ ]: write it so"
 
 
 def _change(content: dict[str, Any], key: str, value: Any, path: Path) -> None:
@@ -211,8 +213,10 @@ def _change(content: dict[str, Any], key: str, value: Any, path: Path) -> None:
         elif isinstance(place, dict):
             index = part
             if part not in place and n < len(parts) - 1:
-                known = ", ".join(place) or "nothing"
-                raise ProblemError(f"{path}: {key}: {where} has no {part!r:.40}; it has {known}.")
+                path_text = ", ".join(place) or "nothing"
+                raise ProblemError(
+                    f"{path}: {key}: {where} has no {part!r:.40}; it has {path_text}."
+                )
         else:
             raise ProblemError(f"{path}: {key}: {where} is {place!r:.40}, which has no parts.")
         if n == len(parts) - 1:
@@ -228,7 +232,7 @@ def _lines(text: str) -> dict[Key, int]:
     table: Key = ()
     depth = 0
     for number, line in enumerate(text.splitlines(), 1):
-        plain = _QUOTED.sub('""', line).partition("#")[0]
+        unquoted = _QUOTED.sub('""', line).partition("#")[0]
         header = _HEADER.fullmatch(line) if depth == 0 else None
         entry = _ENTRY.fullmatch(line) if depth == 0 and header is None else None
         if header is not None:
@@ -244,7 +248,7 @@ def _lines(text: str) -> dict[Key, int]:
             for n in range(1, len(parts) + 1):
                 lines.setdefault((*table, *parts[:n]), number)
         depth = max(
-            depth + sum(plain.count(c) for c in "[{") - sum(plain.count(c) for c in "]}"), 0
+            depth + sum(unquoted.count(c) for c in "[{") - sum(unquoted.count(c) for c in "]}"), 0
         )
     return lines
 

@@ -192,23 +192,25 @@ def called_with(
     table: Table,
     maker: Callable[..., Any],
     what: str = "",
-    besides: Sequence[str] = (),
-    given: Mapping[str, Any] | None = None,
+    other_names: Sequence[str] = (),
+    arguments: Mapping[str, Any] | None = None,
 ) -> Any:
     """Call a function or class with the keys of a table, and values that are known already."""
     parameters = inspect.signature(maker).parameters
-    known = dict(given or {})
+    all_arguments = dict(arguments or {})
     if "units" in parameters and "units" not in table:  # those of the model
-        known["units"] = _units_of_laws(table)
-    table.known([*besides, *(name for name in parameters if name not in (given or {}))], what)
+        all_arguments["units"] = _units_of_laws(table)
+    table.known(
+        [*other_names, *(name for name in parameters if name not in (arguments or {}))], what
+    )
     for name, parameter in parameters.items():
-        if parameter.default is parameter.empty and name not in table and name not in known:
+        if parameter.default is parameter.empty and name not in table and name not in all_arguments:
             table.refuse("", f"the key {name!r}{what} is missing: give it.")
     for name in table.content:
-        if name not in besides:
-            known[name] = argument_of(table, name, maker)
+        if name not in other_names:
+            all_arguments[name] = argument_of(table, name, maker)
     try:
-        return maker(**known)
+        return maker(**all_arguments)
     except (XcrackError, TypeError, ValueError) as error:
         table.wrap(error if isinstance(error, XcrackError) else ProblemError(str(error)))
 
@@ -227,8 +229,8 @@ def _units_of_laws(table: Table) -> str:
 
 def argument_of(table: Table, name: str, maker: Callable[..., Any]) -> Any:
     """A key of a table as the argument of a function, by the rule that it declares."""
-    declared = arguments_of(maker).get(name)
-    rule = None if declared is None else declared.rule
+    declaration = arguments_of(maker).get(name)
+    rule = None if declaration is None else declaration.rule
     value = table.content[name]
     if isinstance(rule, FilePath):
         return _file(table, name)
@@ -249,10 +251,12 @@ def argument_of(table: Table, name: str, maker: Callable[..., Any]) -> Any:
         return value
     is_field = isinstance(rule, _FIELDS)
     parameter = inspect.signature(maker).parameters[name]
-    dimension = LENGTH if name in _BOXES and rule is None else _dimension_of(declared, parameter)
-    given = table.value(name, dimension, _WAY if is_field else "")
-    is_flat_list = isinstance(given, list) and given and not any(isinstance(v, list) for v in given)
-    return tuple(given) if is_flat_list else given
+    dimension = LENGTH if name in _BOXES and rule is None else _dimension_of(declaration, parameter)
+    content = table.value(name, dimension, _WAY if is_field else "")
+    is_flat_list = (
+        isinstance(content, list) and content and not any(isinstance(v, list) for v in content)
+    )
+    return tuple(content) if is_flat_list else content
 
 
 def _are_tables(value: Any) -> bool:
@@ -280,9 +284,9 @@ def _file(table: Table, name: str) -> Path:
     return path
 
 
-def _dimension_of(declared: Argument | None, parameter: inspect.Parameter) -> Dimension | None:
+def _dimension_of(declaration: Argument | None, parameter: inspect.Parameter) -> Dimension | None:
     """Dimension by the rule of an argument; text is refused for numbers without a unit."""
-    unit = None if declared is None or declared.rule is None else declared.rule.unit
+    unit = None if declaration is None or declaration.rule is None else declaration.rule.unit
     if unit is not None:
         return None if callable(unit) else unit
     return NUMBER if str(parameter.annotation) in ("<class 'float'>", "float | None") else None

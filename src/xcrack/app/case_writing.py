@@ -110,23 +110,25 @@ def write_case(
     [0.5, 0.1]
     """
     file = Path(path)
-    if unknown := sorted(set(options) - set(GrowthOptions.__annotations__)):
-        raise TypeError(f"write_case() got an unexpected keyword argument {unknown[0]!r}")
-    given = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, **options}
-    given = {name: value for name, value in given.items() if value is not None}
-    solving = {} if law else {name: given.pop(name) for name in _OF_SOLVE if name in given}
-    for name, value in solving.items():
+    if unknown_names := sorted(set(options) - set(GrowthOptions.__annotations__)):
+        raise TypeError(f"write_case() got an unexpected keyword argument {unknown_names[0]!r}")
+    arguments = {"law": law, "criterion": criterion, "cycle": cycle, "da": da, **options}
+    arguments = {name: value for name, value in arguments.items() if value is not None}
+    solve_arguments = (
+        {} if law else {name: arguments.pop(name) for name in _OF_SOLVE if name in arguments}
+    )
+    for name, value in solve_arguments.items():
         maker = adapt if name in arguments_of(adapt) else solve
         arguments_of(maker)[name].check(value, f"write_case: {name}")
-    _check(given, states, until)
+    _check(arguments, states, until)
     writing = _Writing(file)
     tables: dict[str, Any] = {"mesh": {"kind": "file", "path": f"{file.stem}{_OF_MESH}"}}
     tables |= writing.scene(problem)
     if states is not None:
         tables["solve"]["states"] = writing.states(states, "states")
-    tables["solve"] |= writing.growth(solving)
-    if given:
-        tables["growth"] = writing.growth(given)
+    tables["solve"] |= writing.growth(solve_arguments)
+    if arguments:
+        tables["growth"] = writing.growth(arguments)
     if until is not None:
         tables["growth"]["until"] = list(names_of_sets(until, "write_case: until"))
     text = "\n".join(_lines({"title": title or file.stem}, tables)) + "\n"
@@ -134,22 +136,22 @@ def write_case(
         write_mesh(file.with_suffix(_OF_MESH), problem.mesh)
         with written_whole(file, "the case file is not written to", error=ProblemError) as part:
             part.write_text(text, encoding="utf-8")
-            _compare(part, problem, given, solving)
+            _compare(part, problem, arguments, solve_arguments)
 
 
-def _check(given: Mapping[str, Any], states: Any, until: Any) -> None:
+def _check(arguments: Mapping[str, Any], states: Any, until: Any) -> None:
     """Refuse arguments that do not go together."""
-    if given and not {"law", "criterion", "cycle"} <= set(given):
+    if arguments and not {"law", "criterion", "cycle"} <= set(arguments):
         raise ProblemError(
-            f"write_case: {', '.join(given)}: growth needs law, criterion and cycle: give all "
+            f"write_case: {', '.join(arguments)}: growth needs law, criterion and cycle: give all "
             "three, or none of growth."
         )
-    if until is not None and (callable(until) or not given):
+    if until is not None and (callable(until) or not arguments):
         raise ProblemError(
             f"write_case: until = {value_text(until)}: give names of facet sets, and what grows; a "
             "function is no data."
         )
-    if given and states is not None:
+    if arguments and states is not None:
         raise ProblemError(
             "write_case: states are of a scene that is solved; where cracks grow, cycle says what "
             "is solved: leave states out."
@@ -157,17 +159,19 @@ def _check(given: Mapping[str, Any], states: Any, until: Any) -> None:
 
 
 def _compare(
-    file: Path, problem: Problem, given: Mapping[str, Any], solving: Mapping[str, Any]
+    file: Path, problem: Problem, arguments: Mapping[str, Any], solve_arguments: Mapping[str, Any]
 ) -> None:
     """Read what was written, and refuse where it says something else."""
     with collected_warnings([]):  # those of the mesh and the cycle were said when they were made
         case = read_case(file)
         lines = differences(describe("", problem), describe("", case.problem))
-        lines += differences(describe("solve", solving), describe("solve", dict(case.solving)))
-        if given and not lines:
+        lines += differences(
+            describe("solve", solve_arguments), describe("solve", dict(case.solving))
+        )
+        if arguments and not lines:
             rule, rule_of_file = (
                 describe("", GrowthRule(problem, **growth))  # type: ignore[arg-type]
-                for growth in (given, dict(case.growth or {}))
+                for growth in (arguments, dict(case.growth or {}))
             )
             lines = differences(rule, rule_of_file)
     if lines:
@@ -214,10 +218,10 @@ class _Writing:
         tables["numerics"] = self._fields(numerics, "numerics")
         return {name: table for name, table in tables.items() if table}
 
-    def growth(self, given: Mapping[str, Any]) -> dict[str, Any]:
+    def growth(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """The table of what grows."""
         table: dict[str, Any] = {}
-        for name, value in given.items():
+        for name, value in arguments.items():
             match name:
                 case "law":
                     table[name] = self._by_set(value, GrowthLaw, name)
@@ -306,15 +310,20 @@ class _Writing:
         """What a value was made of, less what it would be without."""
         if not is_dataclass(value):
             self._refuse(what, "function")
-        return {name: self._plain(given, f"{what}: {name}") for name, given in self._given(value)}
+        return {
+            name: self._plain(field_value, f"{what}: {name}")
+            for name, field_value in self._given(value)
+        }
 
     def _given(self, value: Any) -> Iterator[tuple[str, Any]]:
         for name, argument in arguments_of(type(value)).items():
-            given = getattr(value, name)
+            field_value = getattr(value, name)
             default = argument.default
-            if given is None or (type(given) is type(default) and given == default):
+            if field_value is None or (
+                type(field_value) is type(default) and field_value == default
+            ):
                 continue
-            yield name, given
+            yield name, field_value
 
     def _plain(self, value: Any, what: str) -> Any:
         if value is None:
@@ -353,8 +362,8 @@ class _Writing:
             "give a folder of its own for the case."
         )
 
-    def _name(self, value: Any, known: Mapping[str, Any], what: str) -> str:
-        for name, one in known.items():
+    def _name(self, value: Any, public_values: Mapping[str, Any], what: str) -> str:
+        for name, one in public_values.items():
             if one is value:
                 return name
         self._refuse(what, "function")
@@ -368,15 +377,17 @@ def _lines(head: Mapping[str, Any], tables: Mapping[str, Any]) -> Iterator[str]:
     """Lines of a toml file: plain keys, then tables, and lists of tables."""
     yield from (f"{name} = {_toml(value)}" for name, value in head.items())
     for name, content in tables.items():
-        several = isinstance(content, list)
-        for table in content if several else [content]:
+        is_list = isinstance(content, list)
+        for table in content if is_list else [content]:
             yield ""
-            yield f"[[{name}]]" if several else f"[{name}]"
-            yield from (f"{_key(key)} = {_toml(value, long=True)}" for key, value in table.items())
+            yield f"[[{name}]]" if is_list else f"[{name}]"
+            yield from (
+                f"{_key(key)} = {_toml(value, is_long=True)}" for key, value in table.items()
+            )
 
 
-def _toml(value: Any, long: bool = False) -> str:
-    """A value as toml; with `long` an array of more than a line has a line for each entry."""
+def _toml(value: Any, is_long: bool = False) -> str:
+    """A value as toml; with `is_long` an array of more than a line has a line for each entry."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
@@ -387,7 +398,7 @@ def _toml(value: Any, long: bool = False) -> str:
         return f"{{ {', '.join(f'{_key(k)} = {_toml(v)}' for k, v in value.items())} }}"
     entries = [_toml(each) for each in value]
     text = f"[{', '.join(entries)}]"
-    if not long or len(text) <= _WIDTH:
+    if not is_long or len(text) <= _WIDTH:
         return text
     return "[\n" + "".join(f"    {entry},\n" for entry in entries) + "]"
 

@@ -92,22 +92,30 @@ def info(*, warm: Switch = False) -> Info:
     Info
         Printed, it is a list.
     """
-    missing = []
+    missing_packages = []
     for name in _NEEDED:
         try:
             require_package(name, "xcrack")
         except XcrackError as error:
-            missing.append(str(error))
-    drawn = "pyvista in missing"
-    if not any("pyvista" in text for text in missing):
-        drawn = "pyvista" if can_render() else "matplotlib only: pyvista finds no OpenGL (libegl1)"
+            missing_packages.append(str(error))
+    renderer = "pyvista in missing"
+    if not any("pyvista" in text for text in missing_packages):
+        renderer = (
+            "pyvista" if can_render() else "matplotlib only: pyvista finds no OpenGL (libegl1)"
+        )
     packages = {"xcrack": xcrack.__version__}
     packages |= {name: _version(name) for name in (*_NEEDED, *_EXTRA)}
     solvers = ["multifrontal", "conjugate gradients with multigrid"]
     solvers += ["pardiso"] if packages["pypardiso"] else []
     seconds = _warm_kernels() if warm else None
     return Info(
-        packages, tuple(missing), drawn, tuple(solvers), number_of_threads(), _cache(), seconds
+        packages,
+        tuple(missing_packages),
+        renderer,
+        tuple(solvers),
+        number_of_threads(),
+        _cache(),
+        seconds,
     )
 
 
@@ -120,9 +128,9 @@ def _version(name: str) -> str:
 
 def _cache() -> str:
     """Where numba keeps machine code."""
-    given = os.environ.get("NUMBA_CACHE_DIR")
-    if given:
-        return given
+    folder_of_user = os.environ.get("NUMBA_CACHE_DIR")
+    if folder_of_user:
+        return folder_of_user
     cache_folder = Path(xcrack.__file__).parent / "kernels"
     if os.access(cache_folder, os.W_OK):
         return str(cache_folder / "__pycache__")

@@ -175,11 +175,11 @@ def _sweep(options: argparse.Namespace) -> int:
         options.case, values, folder=options.output, workers=options.workers, retry=options.retry
     )
     rows = study.table()
-    shown = [name for name in rows.dtype.names or () if name not in ("seconds", "folder")]
-    print("  ".join(shown))
+    shown_names = [name for name in rows.dtype.names or () if name not in ("seconds", "folder")]
+    print("  ".join(shown_names))
     for row in rows:
         print("  ".join(f"{v:.6g}" if isinstance(v, float) else str(v)
-                        for v in (row[name] for name in shown)))  # fmt: skip
+                        for v in (row[name] for name in shown_names)))  # fmt: skip
     print(study)
     return 1 if study.failed else 0
 

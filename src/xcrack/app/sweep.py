@@ -111,10 +111,10 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
     """
     case = read_case(file, changes)
     if case.growth is None:
-        solved = solved_case(case)
-        return _largest_K([solved] if isinstance(solved, Solution) else list(solved))
+        result = solved_case(case)
+        return _largest_K([result] if isinstance(result, Solution) else list(result))
     steps = Path(folder) / f"run_{key_of(changes)}" / STEPS
-    history = growth_of_case(case, steps, resumed=True, keep_solutions=False, progress=False)
+    history = growth_of_case(case, steps, is_resumed=True, keep_solutions=False, progress=False)
     return {
         "life": history.life,
         "steps": len(history.steps),
@@ -163,8 +163,8 @@ def values_of(text: str) -> tuple[str, list[Any]]:
     ProblemError
         No sign of equality, no key or no value.
     """
-    key, sign, listed = text.partition("=")
-    parts = [part.strip() for part in listed.split(",")]
+    key, sign, value_list = text.partition("=")
+    parts = [part.strip() for part in value_list.split(",")]
     if not sign or not key.strip() or not all(parts):
         raise ProblemError(
             f"--set {text!r:.60}: give a key of the file and its values, such as "

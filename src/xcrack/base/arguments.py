@@ -240,8 +240,8 @@ class Array(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """A read-only copy."""
-        made = (whole_numbers if self.is_whole else numbers)(value, what, self.shape, error=error)
-        return _tuples(made.tolist()) if self.hashable else frozen_copy(made)
+        result = (whole_numbers if self.is_whole else numbers)(value, what, self.shape, error=error)
+        return _tuples(result.tolist()) if self.hashable else frozen_copy(result)
 
 
 @dataclass(frozen=True, repr=False)
@@ -472,13 +472,13 @@ def arguments_of(owner: Any) -> dict[str, Argument]:
 
 @cache
 def _arguments_of(owner: Any) -> dict[str, Argument]:
-    given = owner if isinstance(owner, type) else inspect.unwrap(owner)
-    hints = get_type_hints(given, include_extras=True)
-    if isinstance(given, type) and is_dataclass(given):
+    target = owner if isinstance(owner, type) else inspect.unwrap(owner)
+    hints = get_type_hints(target, include_extras=True)
+    if isinstance(target, type) and is_dataclass(target):
         defaults = {
             field.name: field.default_factory() if field.default is MISSING
             and field.default_factory is not MISSING else field.default
-            for field in fields(given) if field.init
+            for field in fields(target) if field.init
         }  # fmt: skip
         defaults = {
             name: inspect.Parameter.empty if value is MISSING else value
@@ -496,10 +496,10 @@ def _argument(name: str, hint: Any, default: Any) -> Argument:
     rule: Rule | None = None
     is_optional = default is None
     if get_origin(hint) in (Union, UnionType):  # such as Length | None
-        declared = [one for one in get_args(hint) if get_origin(one) is Annotated]
-        if len(declared) == 1:
+        rules = [one for one in get_args(hint) if get_origin(one) is Annotated]
+        if len(rules) == 1:
             is_optional = is_optional or NoneType in get_args(hint)
-            (hint,) = declared
+            (hint,) = rules
     if get_origin(hint) is Annotated:
         hint, *notes = get_args(hint)
         rule = next((note for note in notes if isinstance(note, Rule)), None)
@@ -524,9 +524,9 @@ def check_fields(value: Any, error: Error = ProblemError) -> None:
     """
     kind: Any = type(value)
     for name, argument in arguments_of(kind).items():
-        given = getattr(value, name)
-        result = argument.check(given, f"{kind.__name__}: {name}", error)
-        if result is not given:
+        content = getattr(value, name)
+        result = argument.check(content, f"{kind.__name__}: {name}", error)
+        if result is not content:
             object.__setattr__(value, name, result)
 
 
@@ -560,10 +560,10 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
         parameters = inspect.signature(function).parameters.values()
         takes_any = any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters)
-        known = [p for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
-        names = [p.name for p in known if p.kind is not inspect.Parameter.KEYWORD_ONLY]
-        every_name = {p.name for p in known}
-        required = {p.name for p in known if p.default is inspect.Parameter.empty}
+        bindable = [p for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
+        names = [p.name for p in bindable if p.kind is not inspect.Parameter.KEYWORD_ONLY]
+        every_name = {p.name for p in bindable}
+        required_names = {p.name for p in bindable if p.default is inspect.Parameter.empty}
 
         @cache
         def rules() -> dict[str, tuple[Argument, str]]:  # hints may name what is defined later
@@ -573,20 +573,20 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
             }
 
         @wraps(function)
-        def run(*values: P.args, **named: P.kwargs) -> T:
-            given = dict(zip(names, values))
+        def run(*values: P.args, **keyword_values: P.kwargs) -> T:
+            arguments = dict(zip(names, values))
             if (
                 len(values) > len(names)
-                or not given.keys().isdisjoint(named)
-                or not required <= given.keys() | named.keys()
-                or not (takes_any or named.keys() <= every_name)
+                or not arguments.keys().isdisjoint(keyword_values)
+                or not required_names <= arguments.keys() | keyword_values.keys()
+                or not (takes_any or keyword_values.keys() <= every_name)
             ):
-                return function(*values, **named)  # raises in Python's own words
-            given |= named
+                return function(*values, **keyword_values)  # raises in Python's own words
+            arguments |= keyword_values
             for name, (argument, what) in rules().items():
-                if name in given:
-                    given[name] = argument.check(given[name], what, error)
-            return cast(Callable[..., T], function)(**given)
+                if name in arguments:
+                    arguments[name] = argument.check(arguments[name], what, error)
+            return cast(Callable[..., T], function)(**arguments)
 
         run.__doc__ = _with_bounds(function.__doc__, function.__annotations__)
         return run

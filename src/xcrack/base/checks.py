@@ -116,12 +116,12 @@ def whole_number(
     try:
         result = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
-        rounded = float(value)
-        if not rounded.is_integer():  # nan and inf are not either
+        as_float = float(value)
+        if not as_float.is_integer():  # nan and inf are not either
             raise error(
                 f"{what} = {value_text(value)} is not possible: give {expectation}."
             ) from None
-        result = int(rounded)
+        result = int(as_float)
     if (least is not None and result < least) or (most is not None and result > most):
         raise error(f"{what} = {value_text(value)} is not possible: give {expectation}.")
     if abs(result) >= 2**63:
@@ -134,7 +134,7 @@ def numbers(
     what: str,
     shape: Shape | None = None,
     *,
-    finite: bool = True,
+    must_be_finite: bool = True,
     error: type[XcrackError] = ProblemError,
 ) -> Floats:
     """Check that a value is an array of real numbers of a shape, and return it.
@@ -146,7 +146,7 @@ def numbers(
         Its name in the message.
     shape : tuple of int or None, optional
         Wanted shape, None where any length will do; any shape if omitted.
-    finite : bool
+    must_be_finite : bool
         Refuse nan and infinite entries.
     error : type of XcrackError
 
@@ -176,7 +176,7 @@ def numbers(
         value = _real_array(value, what, expectation, error).astype(np.float64, copy=False)
         _check_shape(value, what, shape, expectation, error)
     result: Floats = value
-    if finite and not np.isfinite(result).all():
+    if must_be_finite and not np.isfinite(result).all():
         where = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
         place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in where)}]"
         raise error(f"{what}{place} = {result[where]}: every number must be finite.")
@@ -241,9 +241,11 @@ def whole_numbers(
     _check_shape(result, what, shape, expectation, error)
     if result.dtype.kind == "f":
         result = result.astype(np.float64, copy=False)  # a half float ends at 65504
-        odd = ~(np.isfinite(result) & (result == np.round(result)) & (np.abs(result) < 2**53))
-        if odd.any():
-            raise error(f"{what} holds {result[odd].flat[0]}: give {expectation}.")
+        is_no_integer = ~(
+            np.isfinite(result) & (result == np.round(result)) & (np.abs(result) < 2**53)
+        )
+        if is_no_integer.any():
+            raise error(f"{what} holds {result[is_no_integer].flat[0]}: give {expectation}.")
     return result.astype(np.int64, copy=False)
 
 
@@ -438,13 +440,13 @@ def _bounds(
 
 
 def values_by_set(
-    given: Any, what: str, values: str, maker: str, value: str, is_value: Callable[[Any], bool]
+    entry: Any, what: str, values: str, maker: str, value: str, is_value: Callable[[Any], bool]
 ) -> tuple[tuple[str, Any], ...]:
     """Check a mapping from names of cell sets to values, and return its pairs.
 
     Parameters
     ----------
-    given : mapping, or tuple of pairs
+    entry : mapping, or tuple of pairs
     what : str
         What the values are of, in messages.
     values, value : str
@@ -458,10 +460,10 @@ def values_by_set(
     ProblemError
         No mapping of names to values.
     """
-    pairs = given.items() if isinstance(given, Mapping) else given
-    if not isinstance(given, Mapping | tuple) or not pairs:
+    pairs = entry.items() if isinstance(entry, Mapping) else entry
+    if not isinstance(entry, Mapping | tuple) or not pairs:
         raise ProblemError(
-            f"{what}: {value_text(given)}: give a mapping of cell sets to {values}, such as "
+            f"{what}: {value_text(entry)}: give a mapping of cell sets to {values}, such as "
             f'{{"plate": {maker}(...), "weld": {maker}(...)}}.'
         )
     for name, each in pairs:
@@ -474,13 +476,13 @@ def values_by_set(
 
 
 def check_set_names(
-    given: Sequence[str], names: Sequence[str], what: str, values: str, value: str
+    set_names: Sequence[str], names: Sequence[str], what: str, values: str, value: str
 ) -> None:
     """Raise where values are for other cell sets than the materials of a problem have.
 
     Parameters
     ----------
-    given, names : sequence of str
+    set_names, names : sequence of str
         Sets that have a value, and those of the materials.
     what, values, value : str
         As of `values_by_set`.
@@ -490,11 +492,11 @@ def check_set_names(
     ProblemError
         A material without a value, or a value without a material.
     """
-    if sorted(given) != sorted(names):
-        known = ", ".join(map(repr, names)) if names[0] else "one, without a name"
+    if sorted(set_names) != sorted(names):
+        listing = ", ".join(map(repr, names)) if names[0] else "one, without a name"
         raise ProblemError(
-            f"{what}: there are {values} for {', '.join(map(repr, given))}, and the materials of "
-            f"the problem are {known}: give each of them {value}."
+            f"{what}: there are {values} for {', '.join(map(repr, set_names))}, and the materials "
+            f"of the problem are {listing}: give each of them {value}."
         )
 
 

@@ -57,8 +57,8 @@ def name_of(value: Any) -> str:
     if not module or module == "builtins":
         return str(name)
     version = getattr(sys.modules.get(package_of(module)), "__version__", "")
-    recorded = is_public_library(module)
-    return f"{module}.{name}" + (f" {version}" if version and not recorded else "")
+    is_recorded = is_public_library(module)
+    return f"{module}.{name}" + (f" {version}" if version and not is_recorded else "")
 
 
 def code_of(function: types.FunctionType) -> str:
@@ -120,8 +120,10 @@ def methods(kind: type) -> Iterator[tuple[str, types.FunctionType]]:
             function = _function_in(member)
             if function is None:
                 continue
-            made = function.__code__.co_filename == "<string>" and name in _MADE_BY_DATACLASS
-            if not (made and is_dataclass(owner)):
+            is_generated = (
+                function.__code__.co_filename == "<string>" and name in _MADE_BY_DATACLASS
+            )
+            if not (is_generated and is_dataclass(owner)):
                 yield f"{owner.__name__}.{name}", function
 
 
@@ -165,7 +167,9 @@ class Description:
         self._described: dict[int, Any] = {}  # functions and objects; alive, so that ids are theirs
         self._packages: set[str] = set()  # installed ones whose functions were given by the user
 
-    def add(self, name: str, value: Any, owners: tuple[int, ...] = (), used: bool = False) -> None:
+    def add(
+        self, name: str, value: Any, owners: tuple[int, ...] = (), is_used: bool = False
+    ) -> None:
         """Describe a value.
 
         Parameters
@@ -175,7 +179,7 @@ class Description:
         value : anything
         owners : tuple of int
             Ids of the values that contain it.
-        used : bool
+        is_used : bool
             It is read by a function, not given.
         """
         if id(value) in owners:
@@ -184,35 +188,35 @@ class Description:
         inner = (*owners, id(value))
         if isinstance(value, np.generic):
             value = value.item()
-        wrapped = wrapped_by(value)
-        if wrapped is not None:
-            value = wrapped
+        inner_function = wrapped_by(value)
+        if inner_function is not None:
+            value = inner_function
         if value is None or isinstance(value, Number | str | bytes | PurePath | Enum):
             self.lines[name] = _short_text(repr(value))
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject:
             text = repr(value.tolist()) if value.size <= _FEW else ""
             content = np.ascontiguousarray(value)
-            hashed = f"{value.dtype} {value.shape} {_hash(content.tobytes())}"
-            self.lines[name] = text if text and len(text) <= _LONG else hashed
+            digest = f"{value.dtype} {value.shape} {_hash(content.tobytes())}"
+            self.lines[name] = text if text and len(text) <= _LONG else digest
         elif isinstance(value, types.FunctionType):
-            self._add_function(name, value, inner, used)
+            self._add_function(name, value, inner, is_used)
         elif isinstance(value, types.MethodType):
-            self.add(name, value.__func__, inner, used)
-            self.add(f"{name}.self", value.__self__, inner, used)
+            self.add(name, value.__func__, inner, is_used)
+            self.add(f"{name}.self", value.__self__, inner, is_used)
         elif isinstance(value, partial):
-            self.add(name, value.func, inner, used)
-            self.add(f"{name}.args", value.args, inner, used)
-            self.add(f"{name}.keywords", value.keywords, inner, used)
+            self.add(name, value.func, inner, is_used)
+            self.add(f"{name}.args", value.args, inner, is_used)
+            self.add(f"{name}.keywords", value.keywords, inner, is_used)
         elif isinstance(value, Mapping | tuple | list | set | frozenset):
-            self._add_container(name, value, inner, used)
+            self._add_container(name, value, inner, is_used)
         elif isinstance(value, _NAMED):
             self._add_named(name, value, inner)
         elif is_dataclass(value):
-            self._add_dataclass(name, value, inner, used)
+            self._add_dataclass(name, value, inner, is_used)
         else:
-            self._add_object(name, value, inner, used)
+            self._add_object(name, value, inner, is_used)
 
-    def _add_container(self, name: str, value: Any, owners: tuple[int, ...], used: bool) -> None:
+    def _add_container(self, name: str, value: Any, owners: tuple[int, ...], is_used: bool) -> None:
         self.lines[name] = f"{len(value)} entries"
         if isinstance(value, Mapping):
             entries = [(f"[{key!r}]", value[key]) for key in value]
@@ -225,25 +229,27 @@ class Description:
             target = Description()
             target._described, target._packages = self._described, self._packages
         for key, item in entries:
-            target.add(name + key, item, owners, used)
+            target.add(name + key, item, owners, is_used)
         if target is not self:
             content = json.dumps(target.lines, sort_keys=True)
             self.lines[name] += f" {_hash(content.encode())}"
 
     def _add_function(
-        self, name: str, function: types.FunctionType, owners: tuple[int, ...], used: bool
+        self, name: str, function: types.FunctionType, owners: tuple[int, ...], is_used: bool
     ) -> None:
         module = function.__module__
         if (module or "").startswith(_OWN):
             function = inspect.unwrap(function)  # what checks its arguments is no setting
             self.lines[name] = f"xcrack.{function.__qualname__}"
             for key, cell in zip(function.__code__.co_freevars, function.__closure__ or ()):
-                self.add(f"{name}.{key}", cell.cell_contents, owners, used)
+                self.add(f"{name}.{key}", cell.cell_contents, owners, is_used)
             return
-        installed = is_installed(module)
-        if installed and not used:
+        is_of_package = is_installed(module)
+        if is_of_package and not is_used:
             self._packages.add(package_of(module))
-        if is_public_library(module) or (installed and package_of(module) not in self._packages):
+        if is_public_library(module) or (
+            is_of_package and package_of(module) not in self._packages
+        ):
             self.lines[name] = name_of(function)
             return
         self.lines[name] = f"{function.__qualname__} {code_of(function)}"
@@ -264,7 +270,7 @@ class Description:
                 for read, value in reads(function):
                     self.add(f"{name}.{key}.{read}", value, owners, True)
 
-    def _add_dataclass(self, name: str, value: Any, owners: tuple[int, ...], used: bool) -> None:
+    def _add_dataclass(self, name: str, value: Any, owners: tuple[int, ...], is_used: bool) -> None:
         is_of_xcrack = type(value).__module__.startswith(_OWN)
         if name:
             self.lines[name] = type(value).__qualname__
@@ -272,14 +278,14 @@ class Description:
             if is_of_xcrack and not field.metadata.get("changes_results", True):
                 continue
             key, item = f"{name}.{field.name}".lstrip("."), getattr(value, field.name)
-            before = set(self.lines)
-            self.add(key, item, owners, used)
+            earlier_names = set(self.lines)
+            self.add(key, item, owners, is_used)
             if is_of_xcrack and is_equal(item, default_of(value, field)):
-                self.at_default |= set(self.lines) - before
+                self.at_default |= set(self.lines) - earlier_names
         if not is_of_xcrack:
             self._add_methods(name, type(value), owners)
 
-    def _add_object(self, name: str, value: Any, owners: tuple[int, ...], used: bool) -> None:
+    def _add_object(self, name: str, value: Any, owners: tuple[int, ...], is_used: bool) -> None:
         """Any other object, by what a copy of it would be made from."""
         kind = type(value)
         self.lines[name] = kind.__qualname__
@@ -296,21 +302,21 @@ class Description:
         arguments, state, *items = (*parts[1:], *(None,) * 4)[:4]
         for argument in arguments or ():
             if argument is not kind:
-                self.add(f"{name}.made of", argument, owners, used)
+                self.add(f"{name}.made of", argument, owners, is_used)
         for part in state if isinstance(state, tuple) else (state,):
             if isinstance(part, Mapping):
                 for key in sorted(part, key=str):
-                    self.add(f"{name}.{key}", part[key], owners, used)
+                    self.add(f"{name}.{key}", part[key], owners, is_used)
             elif part is not None:
-                self.add(f"{name}.state", part, owners, used)
+                self.add(f"{name}.state", part, owners, is_used)
         for entries in items:
             if entries is not None:
-                self.add(f"{name}.items", list(entries), owners, used)
+                self.add(f"{name}.items", list(entries), owners, is_used)
 
     def _is_new(self, value: Any) -> bool:
-        new = id(value) not in self._described
+        is_new = id(value) not in self._described
         self._described[id(value)] = value
-        return new
+        return is_new
 
 
 def default_of(owner: Any, field: Field[Any]) -> Any:
@@ -377,29 +383,33 @@ def default_keys(name: str, value: Any) -> set[str]:
 
 
 def differences(
-    stored: Mapping[str, str], given: Mapping[str, str], new_defaults: Set[str] = frozenset()
+    old_lines: Mapping[str, str], new_lines: Mapping[str, str], new_defaults: Set[str] = frozenset()
 ) -> list[str]:
     """One line for each key in which two descriptions differ.
 
     Parameters
     ----------
-    stored, given : mapping of str to str
+    old_lines, new_lines : mapping of str to str
+        The stored one and the one to compare with it.
     new_defaults : set of str
-        Keys that the stored one may lack: fields that it did not know, at their default.
+        Keys that the stored description may lack: fields it did not know, at their default.
     """
     return [
-        f"{key}: stored {stored.get(key, 'nothing')}, given {given.get(key, 'nothing')}"
-        for key in sorted({*stored, *given})
-        if stored.get(key) != given.get(key) and not (key not in stored and key in new_defaults)
+        f"{key}: stored {old_lines.get(key, 'nothing')}, given {new_lines.get(key, 'nothing')}"
+        for key in sorted({*old_lines, *new_lines})
+        if old_lines.get(key) != new_lines.get(key)
+        and not (key not in old_lines and key in new_defaults)
     ]
 
 
-def only_compiled_differently(stored: Mapping[str, str], given: Mapping[str, str]) -> list[str]:
+def only_compiled_differently(
+    old_lines: Mapping[str, str], new_lines: Mapping[str, str]
+) -> list[str]:
     """Keys of functions whose code differs and whose name does not, as by another python."""
     names = {
-        key: [_FUNCTION.fullmatch(text) for text in (stored[key], given[key])]
-        for key in sorted({*stored} & {*given})
-        if stored[key] != given[key]
+        key: [_FUNCTION.fullmatch(text) for text in (old_lines[key], new_lines[key])]
+        for key in sorted({*old_lines} & {*new_lines})
+        if old_lines[key] != new_lines[key]
     }
     return [key for key, (one, other) in names.items() if one and other and one[1] == other[1]]
 

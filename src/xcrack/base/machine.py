@@ -121,13 +121,13 @@ def stream_tasks(function: Callable[[Task], Result], tasks: Iterable[Task]) -> I
     if pool is None:
         yield from map(function, tasks)
         return
-    ahead: deque[Future[Result]] = deque()
+    pending_tasks: deque[Future[Result]] = deque()
     for task in tasks:
-        ahead.append(pool.submit(function, task))
-        if len(ahead) > number_of_threads():
-            yield ahead.popleft().result()
-    while ahead:
-        yield ahead.popleft().result()
+        pending_tasks.append(pool.submit(function, task))
+        if len(pending_tasks) > number_of_threads():
+            yield pending_tasks.popleft().result()
+    while pending_tasks:
+        yield pending_tasks.popleft().result()
 
 
 class _Blas:

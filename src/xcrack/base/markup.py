@@ -120,14 +120,14 @@ def sketch(points: Floats, boundary: Ints, cracks: Sequence[Floats]) -> Markup:
     """
     view = _TOWARD[points.shape[1]]
     outline = points[boundary] if points.shape[1] < 3 else _box_of(points)
-    flat = [segments @ view.T for segments in (outline, *cracks) if len(segments)]
-    every = np.concatenate([part.reshape(-1, 2) for part in flat])
+    projections = [segments @ view.T for segments in (outline, *cracks) if len(segments)]
+    every = np.concatenate([part.reshape(-1, 2) for part in projections])
     low, high = every.min(axis=0), every.max(axis=0)
     size = np.maximum(high - low, 1e-300)
     scale = min((_WIDTH - 2 * _MARGIN) / size[0], (_HEIGHT - 2 * _MARGIN) / size[1])
     width, height = size * scale + 2 * _MARGIN
     paths = []
-    for number, part in enumerate(flat):
+    for number, part in enumerate(projections):
         place = _MARGIN + (part - low) * scale
         place[..., 1] = height - place[..., 1]
         steps = "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in place)
@@ -144,8 +144,8 @@ def rim(points: Floats, faces: Ints) -> Floats:
     if faces.shape[1] == 2:
         return points[faces]
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return points[unique[count == 1]]
+    edge_pairs, count = np.unique(edges, axis=0, return_counts=True)
+    return points[edge_pairs[count == 1]]
 
 
 def _box_of(points: Floats) -> Floats:

@@ -9,7 +9,7 @@ from xcrack.base.errors import XcrackError
 _PIP_NAME = {"vtkmodules": "vtk", "PIL": "pillow"}  # where that is not the name of the module
 
 
-def require_package(name: str, purpose: str, instead: str = "") -> ModuleType:
+def require_package(name: str, purpose: str, remedy: str = "") -> ModuleType:
     """Import a package that only some functions need; an error says how to install it.
 
     Parameters
@@ -18,7 +18,7 @@ def require_package(name: str, purpose: str, instead: str = "") -> ModuleType:
         Of the module, such as ``"matplotlib.pyplot"``.
     purpose : str
         What it is for, such as ``"plot(renderer='pyvista')"``; the message begins with it.
-    instead : str
+    remedy : str
         What can be done without it: a sentence for the end of the message.
 
     Returns
@@ -39,11 +39,11 @@ def require_package(name: str, purpose: str, instead: str = "") -> ModuleType:
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        missing = _pip_name(error.name or name)
-        needs = "" if missing == package else f" of the package {package}"
+        lacking = _pip_name(error.name or name)
+        needs = "" if lacking == package else f" of the package {package}"
         problem = (
-            f"{purpose} needs the package {missing}{needs}, which is not installed in this Python: "
-            f"python -m pip install {missing}."
+            f"{purpose} needs the package {lacking}{needs}, which is not installed in this Python: "
+            f"python -m pip install {lacking}."
         )
         cause: Exception = error
     except (ImportError, OSError) as error:
@@ -53,7 +53,7 @@ def require_package(name: str, purpose: str, instead: str = "") -> ModuleType:
             "library that the message names."
         )
         cause = error
-    raise XcrackError(f"{problem} {instead}".rstrip()) from cause
+    raise XcrackError(f"{problem} {remedy}".rstrip()) from cause
 
 
 def _pip_name(module: str) -> str:

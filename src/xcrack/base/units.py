@@ -58,10 +58,10 @@ class Units:
     force: str = ""
 
     def __post_init__(self) -> None:
-        for name, allowed in (("length", _LENGTHS), ("force", _FORCES)):
-            given = getattr(self, name)
-            if given and (not isinstance(given, str) or given not in allowed):
-                raise ProblemError(f"{name} = {given!r:.40}: known are {', '.join(allowed)}.")
+        for name, units_of_kind in (("length", _LENGTHS), ("force", _FORCES)):
+            unit = getattr(self, name)
+            if unit and (not isinstance(unit, str) or unit not in units_of_kind):
+                raise ProblemError(f"{name} = {unit!r:.40}: known are {', '.join(units_of_kind)}.")
 
     @property
     def stress(self) -> str:
@@ -84,14 +84,14 @@ class Units:
             raise ProblemError(
                 f"{text!r:.60} is no number with a unit, such as {_example(dimension)}."
             )
-        value, size, computed = float(match[1]), 1.0, NUMBER
-        remaining = match[2]
-        while remaining:
-            size, computed, remaining = _times(size, computed, remaining)
+        value, size, powers = float(match[1]), 1.0, NUMBER
+        remainder = match[2]
+        while remainder:
+            size, powers, remainder = _times(size, powers, remainder)
         expectation = _NAMES.get(dimension, "another quantity")
-        if computed != dimension:
-            have = _NAMES.get(computed, "another quantity")
-            raise ProblemError(f"{text!r:.60} is {have}, but {expectation} belongs here.")
+        if powers != dimension:
+            quantity = _NAMES.get(powers, "another quantity")
+            raise ProblemError(f"{text!r:.60} is {quantity}, but {expectation} belongs here.")
         if dimension != NUMBER and not (self.length and self.force):
             raise ProblemError(
                 f"{text!r:.60} has a unit, but the file does not say its own: give [units] with "
@@ -103,17 +103,17 @@ class Units:
         return result if isfinite(result) else inf
 
 
-def _times(size: float, result: Dimension, remaining: str) -> tuple[float, Dimension, str]:
+def _times(size: float, result: Dimension, remainder: str) -> tuple[float, Dimension, str]:
     """One more factor of a unit."""
-    match = _FACTOR.match(remaining)
+    match = _FACTOR.match(remainder)
     if match is None or match[3] not in _UNITS:
-        name = remaining if match is None else match[3]
+        name = remainder if match is None else match[3]
         unit_names = ", ".join(_UNITS)
         raise ProblemError(f"the unit {name!r:.40} is not known: known are {unit_names}.")
     power = float(match[4] or 1) * (0.5 if match[2] else 1.0) * (-1 if match[1] == "/" else 1)
     factor, factor_dimension = _UNITS[match[3]]
     powers = result[0] + power * factor_dimension[0], result[1] + power * factor_dimension[1]
-    return size * factor**power, powers, remaining[match.end() :]
+    return size * factor**power, powers, remainder[match.end() :]
 
 
 def _example(dimension: Dimension) -> str:

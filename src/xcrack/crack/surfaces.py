@@ -256,7 +256,7 @@ def surface_crack(
     Crack(4 points, 2 faces, not placed)
     """
     what = "surface_crack: points"
-    x = numbers(points, what, (None, 3), finite=False, error=GeometryError)
+    x = numbers(points, what, (None, 3), must_be_finite=False, error=GeometryError)
     faces = whole_numbers(triangles, "surface_crack: triangles", error=GeometryError)
     if not faces.size:
         raise GeometryError("a surface crack needs triangles (f, 3), and there are none.")

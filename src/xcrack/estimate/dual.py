@@ -99,10 +99,10 @@ class Goal:
             turn += (part.factor[:, 0, 1] - part.factor[:, 1, 0]).sum(axis=0)
             for batch, number, row, slope in part.at.batches:
                 add_to_functions(total, batch.functions, row, number, slope, part.factor)
-        for plain in self.cells:
-            turn += plain.turn
-            nodes = space.cell_nodes[plain.cells]
-            add_cells(total, nodes, np.ones(nodes.shape), plain.on_nodes)
+        for cell_group in self.cells:
+            turn += cell_group.turn
+            nodes = space.cell_nodes[cell_group.cells]
+            add_cells(total, nodes, np.ones(nodes.shape), cell_group.on_nodes)
         total[: len(self.rotation)] += self.rotation[:, :, None] * turn
         return total.reshape(-1, self.m)
 
@@ -149,21 +149,23 @@ def groups_of(factored: FactoredSolution) -> GoalGroups | None:
     """Contact groups of a solve; None where no crack has multipliers."""
     model, contact = factored.model, factored.contact
     parts = []
-    for m, pressure, active in zip(contact.spaces, contact.pressure, contact.active, strict=True):
-        if m is not None and pressure is not None and active is not None:
+    for m, pressure, is_active in zip(
+        contact.spaces, contact.pressure, contact.active, strict=True
+    ):
+        if m is not None and pressure is not None and is_active is not None:
             lips = model.lips[m.crack]
             position = (m.values.T @ (lips.weight * lips.s)) / m.measure
             number = np.full(len(m.measure), m.crack)
             rows = gap_rows(m, lips, model.jumps[m.crack])
             piece = np.searchsorted(_breaks(model.space, m.crack, lips), position)
-            parts.append((rows, active, pressure, number, position, piece))
+            parts.append((rows, is_active, pressure, number, position, piece))
     if not parts or contact.dual is None:
         return None
-    every, closed, pressures, crack, position, piece = zip(*parts, strict=True)
+    every, is_closed, pressures, crack, position, piece = zip(*parts, strict=True)
     return GoalGroups(
         sp.csr_matrix(sp.vstack(every)),
         contact.dual,
-        np.concatenate(closed, axis=1),
+        np.concatenate(is_closed, axis=1),
         np.concatenate(pressures),
         np.concatenate(crack),
         np.concatenate(position),
@@ -224,17 +226,17 @@ def duals(
         nothing = np.zeros((0, f.shape[1]))
         return DualSolutions(z, np.zeros(states, dtype=np.int64), nothing[None], nothing)
     per_pressure = groups.N @ z0 + _on_groups(factored, groups, goals)
-    sets, which = np.unique(groups.active, axis=0, return_inverse=True)
+    sets, set_number = np.unique(groups.active, axis=0, return_inverse=True)
     every, mus = [], []
-    for active in sets:
+    for is_active in sets:
         z, mu = z0, np.zeros_like(per_pressure)
-        if active.any():
-            columns = [of_set(groups.dual, -d, active)[0] for d in per_pressure.T]
+        if is_active.any():
+            columns = [of_set(groups.dual, -d, is_active)[0] for d in per_pressure.T]
             mu = np.stack(columns, axis=1)
             z = z0 - factored.engine.solve(groups.N.T @ mu)
         every.append(without_motion(motion, z))
         mus.append(mu)
-    return DualSolutions(np.stack(every), which.ravel(), np.stack(mus), per_pressure)
+    return DualSolutions(np.stack(every), set_number.ravel(), np.stack(mus), per_pressure)
 
 
 def _on_groups(factored: FactoredSolution, groups: GoalGroups, goals: Sequence[Goal]) -> Floats:
@@ -268,22 +270,22 @@ def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -
     k : int
         State.
     """
-    active, pressure = groups.active[k], groups.pressure[:, k]
+    is_active, pressure = groups.active[k], groups.pressure[:, k]
     total = np.zeros(duals.per_pressure.shape[1])
-    if not active.any():
+    if not is_active.any():
         return total
-    opened = gap - groups.dual @ pressure
+    gap_without_group = gap - groups.dual @ pressure
     order = np.lexsort((groups.position, groups.crack))
-    along, crack, piece = active[order], groups.crack[order], groups.piece[order]
+    is_active_in_order, crack, piece = is_active[order], groups.crack[order], groups.piece[order]
     same_piece = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
-    ends = np.nonzero((along[1:] != along[:-1]) & same_piece)[0]
+    ends = np.nonzero((is_active_in_order[1:] != is_active_in_order[:-1]) & same_piece)[0]
     for end in ends:
         changes = []
         for group in (order[end], order[end + 1]):
-            other = active.copy()
+            other = is_active.copy()
             other[group] = ~other[group]
-            moved = of_set(groups.dual, opened, other)[0] - pressure
-            changes.append(np.abs(duals.per_pressure.T @ moved))
+            pressure_change = of_set(groups.dual, gap_without_group, other)[0] - pressure
+            changes.append(np.abs(duals.per_pressure.T @ pressure_change))
         both = changes[0] + changes[1]
         total += changes[0] * changes[1] / np.where(both > 0, both, 1.0)
     return total

@@ -76,9 +76,9 @@ def estimate(
     m = dual.z.shape[2]
     sets = np.unique(dual.which[[s.number for s in solutions]])
     columns = [np.stack([s.u for s in solutions], axis=1), *dual.z[sets]]
-    stacked = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
-    stacked = np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
-    residual, blocks = residuals(w, solutions[0].problem.elasticity, stacked)
+    nodal = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
+    nodal = np.concatenate([nodal, np.zeros((1, *nodal.shape[1:]))])
+    residual, blocks = residuals(w, solutions[0].problem.elasticity, nodal)
     r_u, r_z = residual[:, :, : len(solutions)], residual[:, :, len(solutions) :]
     for k, solution in enumerate(solutions):
         r_u[:, :, k] += load_residual(w, solution)
@@ -87,24 +87,24 @@ def estimate(
         if pressure.any():
             r_u += face_residual(w, lips, pressure)
     e_u = solved(w, blocks, r_u)
-    given = [imposed(w, s) for s in solutions]
+    imposed_values = [imposed(w, s) for s in solutions]
     goal = np.concatenate([goal_residual(w, g) for g in goals], axis=2)
     mus = tuple(np.zeros((len(solutions), len(lips), m)) for lips in factored.model.lips)
     eta, end = np.zeros((2, len(solutions), m))
     by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
     parts = np.zeros((len(solutions), len(w.fixed), m))
     for k, solution in enumerate(solutions):
-        which = int(dual.which[solution.number])
-        place = int(np.searchsorted(sets, which)) * m
+        set_number = int(dual.which[solution.number])
+        place = int(np.searchsorted(sets, set_number)) * m
         r = r_z[:, :, place : place + m] + goal
         for c, lips in enumerate(factored.model.lips):
             contact = factored.contact.spaces[c]
             if groups is not None and contact is not None:
-                mu = contact.values @ dual.mu[which][groups.crack == c]
+                mu = contact.values @ dual.mu[set_number][groups.crack == c]
                 mus[c][k] = mu
                 if mu.any():
                     r -= face_residual(w, lips, mu)
-        each = np.einsum("nim,ni->nm", r, e_u[:, :, k] + given[k])
+        each = np.einsum("nim,ni->nm", r, e_u[:, :, k] + imposed_values[k])
         eta[k] = each.sum(axis=0)
         parts[k], by_cell[k] = each, shares(w, each).T
         if groups is not None:
@@ -119,7 +119,7 @@ def pressure_on(solution: Solution, c: int) -> Floats:
     contact: Contact | None = solution.contact[c]
     total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
     for load, factor in solution.acting:
-        given = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
-        if given is not None:
-            total += factor * given
+        pressure = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
+        if pressure is not None:
+            total += factor * pressure
     return total

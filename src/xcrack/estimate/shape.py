@@ -28,9 +28,9 @@ _OPEN, _SMOOTH, _KINK, _BLUNT = 0.1, 0.2, 0.9, 0.5
 
 def crack_shape(
     solutions: Sequence[Solution],
-    estimated: Estimate,
+    estimate: Estimate,
     c: int,
-    singular: Callable[[], tuple[Floats, Floats]],
+    singular_part: Callable[[], tuple[Floats, Floats]],
 ) -> tuple[Floats, Floats]:
     """Crack c as it was given, not as the cells cut it: changes `(states, m)`, and their bars.
 
@@ -41,56 +41,66 @@ def crack_shape(
     Parameters
     ----------
     solutions : sequence of Solution
-    estimated : Estimate
+    estimate : Estimate
     c : int
-    singular : callable
+    singular_part : callable
         Values `(2, q, 2, m)` and gradients `(2, q, 2, 2, m)` on the faces - and + that z has and
         influence functions have not; called where the crack is not straight.
     """
     space, lips = solutions[0].space, solutions[0].lips[c]
-    z, mu = estimated.z, estimated.mu[c]
+    z, mu = estimate.z, estimate.mu[c]
     nothing = np.zeros((len(solutions), z.shape[2]))
     foot, turn, normal, way = _nearest_on(space.cracks[c].points, lips.x)
-    away = _along_normal(foot - lips.x, lips.normal)
+    offset = _along_normal(foot - lips.x, lips.normal)
     n = lips.normal
     normal = normal * np.sign(np.einsum("qd,qd->q", normal, n))[:, None]
-    moved = np.nonzero(np.abs(away) > 1e-9 * space.mesh.extent)[0]
-    if not len(moved):
+    moved_points = np.nonzero(np.abs(offset) > 1e-9 * space.mesh.extent)[0]
+    if not len(moved_points):
         return nothing, nothing
-    values, slopes = (part[:, moved] for part in singular())
-    n, turned = n[moved], (normal - n)[moved]
-    pressure = np.stack([pressure_on(s, c)[moved] for s in solutions], axis=1)
-    shifted, tilted = np.zeros((2, len(moved), *nothing.shape))
+    values, slopes = (part[:, moved_points] for part in singular_part())
+    n, normal_change = n[moved_points], (normal - n)[moved_points]
+    pressure = np.stack([pressure_on(s, c)[moved_points] for s in solutions], axis=1)
+    shifted, by_turn = np.zeros((2, len(moved_points), *nothing.shape))
     for s, sign in ((0, -1.0), (1, 1.0)):
-        cell = lips.cell[moved, s]
-        side = lip_side(space, c, cell, lips.bary[moved, s], int(sign))
-        u, gradient = fields_at(space, _columns(solutions, z), cell, lips.bary[moved, s], side)
+        cell = lips.cell[moved_points, s]
+        side = lip_side(space, c, cell, lips.bary[moved_points, s], int(sign))
+        u, gradient = fields_at(
+            space, _columns(solutions, z), cell, lips.bary[moved_points, s], side
+        )
         for k, solution in enumerate(solutions):
             gradient_of_goal, first = gradient[..., k], len(solutions) + k * z.shape[2]
             dual = gradient[..., first : first + z.shape[2]] - slopes[s]
             weight = u[..., first : first + z.shape[2]] - values[s]
-            sigma = solution.problem.elasticity.stress(gradient_of_goal, cell, lips.bary[moved, s])
+            sigma = solution.problem.elasticity.stress(
+                gradient_of_goal, cell, lips.bary[moved_points, s]
+            )
             shifted[:, k] += sign * np.einsum("qij,qijm->qm", sigma, dual)
             normals = np.einsum("qi,qijm,qj->qm", n, dual, n)
             shifted[:, k] += sign * pressure[:, k, None] * normals
             opening = np.einsum("qi,qij,qj->q", n, gradient_of_goal, n)
-            shifted[:, k] -= sign * mu[k][moved] * opening[:, None]
-            slid = np.einsum("qi,qim->qm", turned, weight) * pressure[:, k, None]
-            slid -= np.einsum("qi,qi->q", turned, u[..., k])[:, None] * mu[k][moved]
-            tilted[:, k] += sign * slid
-    parts = lips.weight[moved][:, None, None] * (away[moved][:, None, None] * shifted + tilted)
-    blunt = np.minimum(turn[moved] / _BLUNT, 1.0)
-    presses = pressure.any(axis=1) | np.any([each[moved].any(axis=1) for each in mu], axis=0)
-    smooth = (1 - blunt)[:, None, None] * parts
+            shifted[:, k] -= sign * mu[k][moved_points] * opening[:, None]
+            slip_work = np.einsum("qi,qim->qm", normal_change, weight) * pressure[:, k, None]
+            slip_work -= (
+                np.einsum("qi,qi->q", normal_change, u[..., k])[:, None] * mu[k][moved_points]
+            )
+            by_turn[:, k] += sign * slip_work
+    parts = lips.weight[moved_points][:, None, None] * (
+        offset[moved_points][:, None, None] * shifted + by_turn
+    )
+    bluntness = np.minimum(turn[moved_points] / _BLUNT, 1.0)
+    has_traction = pressure.any(axis=1) | np.any(
+        [each[moved_points].any(axis=1) for each in mu], axis=0
+    )
+    smooth_parts = (1 - bluntness)[:, None, None] * parts
     cells = lips.weight / space.mesh.cell_size[lips.cell[:, 0]]
     order = np.argsort(way, kind="stable")
     stretch = np.empty(len(lips), dtype=np.int64)
     stretch[order] = np.cumsum(cells[order]) / _STRETCH
     of_stretch = np.zeros((int(stretch.max()) + 1, *nothing.shape))
-    np.add.at(of_stretch, stretch[moved][presses], smooth[presses])
+    np.add.at(of_stretch, stretch[moved_points][has_traction], smooth_parts[has_traction])
     doubt = _SMOOTH * np.abs(of_stretch).sum(axis=0)
-    doubt += _OPEN * np.abs(smooth[~presses]).sum(axis=0)
-    doubt += (_SMOOTH + _KINK) * np.einsum("q,qkm->km", blunt, np.abs(parts))
+    doubt += _OPEN * np.abs(smooth_parts[~has_traction]).sum(axis=0)
+    doubt += (_SMOOTH + _KINK) * np.einsum("q,qkm->km", bluntness, np.abs(parts))
     return parts.sum(axis=0), doubt
 
 
@@ -112,12 +122,12 @@ def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]
     for facets, curve in sides:
         points, normal = facet_points(solutions[0].space, facets, 3)
         x = position(solutions[0].space, points.cell, points.bary)
-        away = np.einsum("qd,qd->q", np.asarray(curve(x)) - x, normal)
-        shape_terms -= _boundary_changes(solutions, z, points, away)
+        offset = np.einsum("qd,qd->q", np.asarray(curve(x)) - x, normal)
+        shape_terms -= _boundary_changes(solutions, z, points, offset)
     facets, sagitta = _chords(mesh)
     if len(facets) and sides:
-        curved = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
-        other = ~np.isin(mesh.facet_numbers(facets), curved)
+        curved_numbers = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
+        other = ~np.isin(mesh.facet_numbers(facets), curved_numbers)
         facets, sagitta = facets[other], sagitta[other]
     if not len(facets):
         return shape_terms, np.zeros_like(shape_terms)
@@ -128,11 +138,11 @@ def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]
 
 
 def _boundary_changes(
-    solutions: Sequence[Solution], z: Floats, points: Points, away: Floats
+    solutions: Sequence[Solution], z: Floats, points: Points, offset: Floats
 ) -> Floats:
     """Integral of away sigma(u) : eps(z) over boundary points `(states, m)`."""
     density = _products(solutions, z, (points.cell, points.bary, points.side))
-    return np.asarray(np.einsum("q,qkm->km", points.weight * away, density))
+    return np.asarray(np.einsum("q,qkm->km", points.weight * offset, density))
 
 
 def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -140,34 +150,36 @@ def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats, Fl
 
     Turns and ways along the line are `(q,)`.
     """
-    a, along = polyline[:-1], np.diff(polyline, axis=0)
-    t = np.einsum("qsd,sd->qs", x[:, None] - a, along) / (along * along).sum(axis=1)
+    a, segment = polyline[:-1], np.diff(polyline, axis=0)
+    t = np.einsum("qsd,sd->qs", x[:, None] - a, segment) / (segment * segment).sum(axis=1)
     t = np.clip(t, 0.0, 1.0)
-    foot = a + t[..., None] * along
+    foot = a + t[..., None] * segment
     best = np.linalg.norm(x[:, None] - foot, axis=2).argmin(axis=1)
     row = np.arange(len(x))
-    heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
+    heading = np.unwrap(np.arctan2(segment[:, 1], segment[:, 0]))
     turn = np.concatenate([[0.0], np.abs(np.diff(heading)), [0.0]])
-    normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    normal = np.stack([-segment[:, 1], segment[:, 0]], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    length = np.linalg.norm(along, axis=1)
+    length = np.linalg.norm(segment, axis=1)
     way = (np.cumsum(length) - length)[best] + t[row, best] * length[best]
     return foot[row, best], turn[best + (t[row, best] > 0.5)], normal[best], way
 
 
 def _along_normal(way: Floats, normal: Floats) -> Floats:
     """Distances along the normal to lines whose nearest points are given by the way there."""
-    across = np.einsum("qd,qd->q", way, normal)
+    distance = np.einsum("qd,qd->q", way, normal)
     square = np.einsum("qd,qd->q", way, way)
-    steep = across * across < 0.5 * square  # at a vertex, or far from parallel
-    return np.where(steep, across, square / np.where(steep, 1.0, across + (across == 0)))
+    is_steep = distance * distance < 0.5 * square  # at a vertex, or far from parallel
+    return np.where(
+        is_steep, distance, square / np.where(is_steep, 1.0, distance + (distance == 0))
+    )
 
 
 def _columns(solutions: Sequence[Solution], z: Floats) -> Floats:
     """Coefficients of the states, then of their dual solutions, with a last row of zeros."""
     columns = np.concatenate([np.stack([s.u for s in solutions], axis=1), *z], axis=1)
-    stacked = columns.reshape(solutions[0].space.n_functions, 2, -1)
-    return np.concatenate([stacked, np.zeros((1, *stacked.shape[1:]))])
+    nodal = columns.reshape(solutions[0].space.n_functions, 2, -1)
+    return np.concatenate([nodal, np.zeros((1, *nodal.shape[1:]))])
 
 
 def _products(
@@ -191,26 +203,32 @@ def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
     facets = mesh.boundary
     cell = mesh.facet_to_cell[mesh.facet_to_cell[:, 1] < 0, 0]
     x = mesh.points[facets]
-    along = x[:, 1] - x[:, 0]
-    outward = x.mean(axis=1) - mesh.points[mesh.cells[cell]].mean(axis=1)
-    backward = along[:, 0] * outward[:, 1] - along[:, 1] * outward[:, 0] > 0
-    ends = np.where(backward[:, None], facets[:, ::-1], facets)  # the body on the left
-    along = np.where(backward[:, None], -along, along)
-    incoming, outgoing = np.full((2, mesh.n_points), -1)
-    incoming[ends[:, 1]], outgoing[ends[:, 0]] = np.arange(len(ends)), np.arange(len(ends))
-    heading = np.arctan2(along[:, 1], along[:, 0])
-    before, after = incoming[ends[:, 0]], outgoing[ends[:, 1]]
+    chord = x[:, 1] - x[:, 0]
+    outward_direction = x.mean(axis=1) - mesh.points[mesh.cells[cell]].mean(axis=1)
+    is_backward = chord[:, 0] * outward_direction[:, 1] - chord[:, 1] * outward_direction[:, 0] > 0
+    ends = np.where(is_backward[:, None], facets[:, ::-1], facets)  # the body on the left
+    chord = np.where(is_backward[:, None], -chord, chord)
+    facet_to_begin, facet_from_end = np.full((2, mesh.n_points), -1)
+    facet_to_begin[ends[:, 1]], facet_from_end[ends[:, 0]] = (
+        np.arange(len(ends)),
+        np.arange(len(ends)),
+    )
+    heading = np.arctan2(chord[:, 1], chord[:, 0])
+    previous_facet, next_facet = facet_to_begin[ends[:, 0]], facet_from_end[ends[:, 1]]
 
     def turn(first: Ints, second: Ints) -> Floats:
         difference = heading[second] - heading[first]
         return np.asarray((difference + np.pi) % (2 * np.pi) - np.pi)
 
     facet_numbers = np.arange(len(ends))
-    low, high = turn(before, facet_numbers), turn(facet_numbers, after)
-    small, large = np.minimum(np.abs(low), np.abs(high)), np.maximum(np.abs(low), np.abs(high))
-    curved = (before >= 0) & (after >= 0) & (low * high > 0) & (small > 1e-6)
-    curved &= (large < _ROUND) & (large < _ALIKE * small)
-    length = np.linalg.norm(along, axis=1)
+    low, high = turn(previous_facet, facet_numbers), turn(facet_numbers, next_facet)
+    smaller_turn, larger_turn = (
+        np.minimum(np.abs(low), np.abs(high)),
+        np.maximum(np.abs(low), np.abs(high)),
+    )
+    is_curved = (previous_facet >= 0) & (next_facet >= 0) & (low * high > 0) & (smaller_turn > 1e-6)
+    is_curved &= (larger_turn < _ROUND) & (larger_turn < _ALIKE * smaller_turn)
+    length = np.linalg.norm(chord, axis=1)
     # An arc that turns by t over a chord of length L lies L t / 12 outside of it in the mean.
     sagitta = (low + high) / 2 * length / 12
-    return ends[curved], sagitta[curved]
+    return ends[is_curved], sagitta[is_curved]

@@ -61,14 +61,14 @@ class HierarchicalSurplus:
         return self.functions, self.sign, self.copy, self.crack, self.space.mesh.gradient
 
 
-def surplus(space: FunctionSpace, fixed: Bools) -> HierarchicalSurplus:
+def surplus(space: FunctionSpace, is_fixed: Bools) -> HierarchicalSurplus:
     """The surplus space of a function space.
 
     Parameters
     ----------
     space : FunctionSpace
         Of order 2 in 2D.
-    fixed : (n_dof,) array of bool
+    is_fixed : (n_dof,) array of bool
         Unknowns that supports decide.
     """
     mesh = space.mesh
@@ -90,7 +90,7 @@ def surplus(space: FunctionSpace, fixed: Bools) -> HierarchicalSurplus:
     copy[jumps] = n + np.arange(int(jumps.sum()))
     components = np.zeros((n + int(jumps.sum()), 2), dtype=bool)
     middles = slice(mesh.n_points, mesh.n_points + edges)
-    components[:edges] = fixed.reshape(-1, 2)[middles]
+    components[:edges] = is_fixed.reshape(-1, 2)[middles]
     components[copy[jumps]] = components[:n][jumps]
     i, j = local_edges(2).T
     sign = np.where(mesh.cells[:, i] < mesh.cells[:, j], 1.0, -1.0)
@@ -105,8 +105,8 @@ def _crack_edges(space: FunctionSpace, c: int) -> Ints:
     pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
     if not len(pairs):
         return np.zeros(0, dtype=np.int64)
-    shared = [np.intersect1d(to_edge[a], to_edge[b]) for a, b in np.unique(pairs, axis=0)]
-    return np.concatenate(shared)
+    shared_edges = [np.intersect1d(to_edge[a], to_edge[b]) for a, b in np.unique(pairs, axis=0)]
+    return np.concatenate(shared_edges)
 
 
 def residuals(
@@ -135,17 +135,17 @@ def residuals(
     mesh = space.mesh
     residual = np.zeros((len(surplus.fixed), 2, coefficients.shape[2]))
     blocks = np.zeros((len(surplus.copy), 4, 4))
-    special = space.signature != 0
-    special |= (surplus.copy[surplus.functions] >= 0).any(axis=1)
-    linear, square = _reference()
+    is_special = space.signature != 0
+    is_special |= (surplus.copy[surplus.functions] >= 0).any(axis=1)
+    at_corners, square = _reference()
     for material, cells in elasticity.groups(np.arange(len(mesh.cells))):
         lame = isotropic_part(material.unit.tensor(2))[:2]
-        plain = np.logical_not(special[cells]) & (not material.is_graded)
+        is_plain = np.logical_not(is_special[cells]) & (not material.is_graded)
         take_plain_stress(
-            residual, blocks, cells[plain], space.cell_nodes, coefficients,
-            mesh.gradient, mesh.volume, surplus.functions, surplus.sign, linear, square, *lame,
+            residual, blocks, cells[is_plain], space.cell_nodes, coefficients,
+            mesh.gradient, mesh.volume, surplus.functions, surplus.sign, at_corners, square, *lame,
         )  # fmt: skip
-        points = cell_points(space, cells[~plain], _POINTS, _DEGREE + material.is_graded)
+        points = cell_points(space, cells[~is_plain], _POINTS, _DEGREE + material.is_graded)
         if len(points.cell):
             strain = gradients_at(space, coefficients, points.cell, points.bary, points.side)
             weight = elasticity.weights(points.cell, points.bary, points.weight)
@@ -165,61 +165,61 @@ def goal_residual(surplus: HierarchicalSurplus, goal: Goal) -> Floats:
     for part in goal.parts:
         at = part.at.points
         add_functional(result, at.cell, at.bary, at.side, part.factor, *surplus.arrays)
-    for plain in goal.cells:
-        functions = surplus.functions[plain.cells]
+    for cell_group in goal.cells:
+        functions = surplus.functions[cell_group.cells]
         factor = np.ones(functions.shape)
-        factor[:, :3] = surplus.sign[plain.cells]
-        add_cells(result, functions, factor, plain.on_surplus)
+        factor[:, :3] = surplus.sign[cell_group.cells]
+        add_cells(result, functions, factor, cell_group.on_surplus)
         copy = surplus.copy[functions]
         if (copy >= 0).any():
-            side = cell_side(surplus.space, plain.cells)
+            side = cell_side(surplus.space, cell_group.cells)
             side = np.take_along_axis(side, surplus.crack[functions], axis=1)
-            add_cells(result, copy, factor * side, plain.on_surplus)
+            add_cells(result, copy, factor * side, cell_group.on_surplus)
     return result
 
 
 def solved(surplus: HierarchicalSurplus, blocks: Floats, residual: Floats) -> Floats:
     """Each function with its copy alone: block^-1 residual `(n + copies, 2, m)`, 0 where fixed."""
-    copied = np.nonzero(surplus.copy >= 0)[0]
-    copies = surplus.copy[copied]
+    copied_edges = np.nonzero(surplus.copy >= 0)[0]
+    copies = surplus.copy[copied_edges]
     n = len(surplus.copy)
     result = np.where(surplus.fixed[:, :, None], 0.0, residual)
     a, b, c = blocks[:, 0, 0, None], blocks[:, 0, 1, None], blocks[:, 1, 1, None]
-    loose = surplus.fixed[:n].sum(axis=1) == 0
+    is_loose = surplus.fixed[:n].sum(axis=1) == 0
     x, y = result[:n, 0], result[:n, 1]
-    coupling = np.where(loose[:, None], b, 0.0)
+    coupling = np.where(is_loose[:, None], b, 0.0)
     determinant = a * c - coupling * coupling
     result[:n] = np.stack([c * x - coupling * y, a * y - coupling * x], axis=1)
     result[:n] /= determinant[:, None]
-    if len(copied):
-        right = np.concatenate([residual[copied], residual[copies]], axis=1)
-        fixed = np.concatenate([surplus.fixed[copied], surplus.fixed[copies]], axis=1)
-        four = _regular_solutions(blocks[copied], right, fixed)
-        result[copied], result[copies] = four[:, :2], four[:, 2:]
+    if len(copied_edges):
+        rhs = np.concatenate([residual[copied_edges], residual[copies]], axis=1)
+        is_fixed = np.concatenate([surplus.fixed[copied_edges], surplus.fixed[copies]], axis=1)
+        pair_solutions = _regular_solutions(blocks[copied_edges], rhs, is_fixed)
+        result[copied_edges], result[copies] = pair_solutions[:, :2], pair_solutions[:, 2:]
     return result
 
 
-def _regular_solutions(blocks: Floats, right: Floats, fixed: Bools) -> Floats:
+def _regular_solutions(blocks: Floats, rhs: Floats, is_fixed: Bools) -> Floats:
     """Solutions of blocks of four; a copy on a sliver hardly differs from its function."""
     k = np.arange(4)
-    free: Bools = np.logical_not(fixed)
-    A = blocks * (free[:, :, None] & free[:, None, :])
-    A[:, k, k] += fixed
+    is_free: Bools = np.logical_not(is_fixed)
+    A = blocks * (is_free[:, :, None] & is_free[:, None, :])
+    A[:, k, k] += is_fixed
     scale = 1 / np.sqrt(A[:, k, k])
     A = A * scale[:, :, None] * scale[:, None, :]
     A[:, k, k] += 1e-9
-    x = np.linalg.solve(A, right * (free * scale)[:, :, None])
+    x = np.linalg.solve(A, rhs * (is_free * scale)[:, :, None])
     return np.asarray(x * scale[:, :, None])
 
 
-def shares(surplus: HierarchicalSurplus, parts: Floats, together: bool = False) -> Floats:
+def shares(surplus: HierarchicalSurplus, parts: Floats, is_total: bool = False) -> Floats:
     """Absolute contributions of functions, by cell: an edge's is halved between its cells.
 
     Parameters
     ----------
     surplus : HierarchicalSurplus
     parts : (n + copies, m) array
-    together : bool
+    is_total : bool
         A function and its copy count as one: on a sliver both are large and cancel.
 
     Returns
@@ -227,10 +227,10 @@ def shares(surplus: HierarchicalSurplus, parts: Floats, together: bool = False) 
     (cells, m) array
     """
     n, mesh = len(surplus.copy), surplus.space.mesh
-    size = np.array if together else np.abs
+    size = np.array if is_total else np.abs
     edge_shares = size(parts[:n])
-    copied = np.nonzero(surplus.copy >= 0)[0]
-    edge_shares[copied] += size(parts[surplus.copy[copied]])
+    copied_edges = np.nonzero(surplus.copy >= 0)[0]
+    edge_shares[copied_edges] += size(parts[surplus.copy[copied_edges]])
     edge_shares = np.abs(edge_shares)
     edge_shares[: len(mesh.edges)][mesh.facet_to_cell[:, 1] >= 0] /= 2
     return np.asarray(edge_shares[surplus.functions].sum(axis=1))
@@ -242,21 +242,23 @@ def _reference() -> tuple[Floats, Floats]:
 
     w_,b is the derivative with respect to the barycentric coordinate L_b.
     """
-    cubic = {0: [((2, 1, 0), 1.0), ((1, 2, 0), -1.0)], 1: [((2, 0, 1), 1.0), ((1, 0, 2), -1.0)],
+    cubics = {0: [((2, 1, 0), 1.0), ((1, 2, 0), -1.0)], 1: [((2, 0, 1), 1.0), ((1, 0, 2), -1.0)],
              2: [((0, 2, 1), 1.0), ((0, 1, 2), -1.0)], 3: [((1, 1, 1), 1.0)]}  # fmt: skip
-    linear, square = np.zeros((4, 3, 3)), np.zeros((4, 3, 3))
-    for a, terms in cubic.items():
+    at_corners, square = np.zeros((4, 3, 3)), np.zeros((4, 3, 3))
+    for a, terms in cubics.items():
         slopes = [[_derivative(power, b, f) for power, f in terms] for b in range(3)]
         for b in range(3):
             for power, f in slopes[b]:
                 for c in range(3):
-                    linear[a, b, c] += f * _mean_of_monomial(np.add(power, np.eye(3, dtype=int)[c]))
+                    at_corners[a, b, c] += f * _mean_of_monomial(
+                        np.add(power, np.eye(3, dtype=int)[c])
+                    )
             for c in range(3):
                 for p, f in slopes[b]:
                     square[a, b, c] += sum(
                         f * g * _mean_of_monomial(np.add(p, q)) for q, g in slopes[c]
                     )
-    return lock(linear), lock(square)
+    return lock(at_corners), lock(square)
 
 
 def _derivative(power: tuple[int, ...], b: int, factor: float) -> tuple[tuple[int, ...], float]:
@@ -317,9 +319,9 @@ def _add_volume(
         _add(result, surplus, points, factor * load.volume(x))
     if "initial_stress" in load.acts:
         sigma = factor * elasticity.initial_stress(load, x, points.cell, points.bary)
-        weighted = -points.weight[:, None, None] * sigma
+        weighted_stress = -points.weight[:, None, None] * sigma
         add_functional(
-            result[:, :, None], points.cell, points.bary, points.side, weighted[..., None],
+            result[:, :, None], points.cell, points.bary, points.side, weighted_stress[..., None],
             *surplus.arrays,
         )  # fmt: skip
 
@@ -372,17 +374,21 @@ def imposed(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
     Displacements that are fitted beside a crack count as exact.
     """
     result = np.zeros((len(surplus.fixed), 2))
-    taken = np.zeros((len(surplus.fixed), 2), dtype=bool)
-    moved = {str(load.place): (load, f) for load, f in solution.acting if "support" in load.acts}
-    for given in solution.problem.supports:
-        support, factor = moved.get(str(given.where), (given, solution.factor))
-        if isinstance(given.where, str) and not support.is_uniform:
-            _impose(result, taken, surplus, cast(Support, support), factor)
+    is_taken = np.zeros((len(surplus.fixed), 2), dtype=bool)
+    moved_supports = {
+        str(load.place): (load, f) for load, f in solution.acting if "support" in load.acts
+    }
+    for support_of_problem in solution.problem.supports:
+        support, factor = moved_supports.get(
+            str(support_of_problem.where), (support_of_problem, solution.factor)
+        )
+        if isinstance(support_of_problem.where, str) and not support.is_uniform:
+            _impose(result, is_taken, surplus, cast(Support, support), factor)
     return result
 
 
 def _impose(
-    result: Floats, taken: Bools, surplus: HierarchicalSurplus, support: Support, factor: float
+    result: Floats, is_taken: Bools, surplus: HierarchicalSurplus, support: Support, factor: float
 ) -> None:
     mesh = surplus.space.mesh
     facets = facet_set(mesh, support.where, support.name)
@@ -396,14 +402,14 @@ def _impose(
     at = {t: support.displacement_at(t * i + (1 - t) * j) for t in (0.0, 0.25, 0.5, 0.75, 1.0)}
 
     def rest(t: float) -> Floats:
-        quadratic = at[1.0] * t * (2 * t - 1) + at[0.0] * (1 - t) * (1 - 2 * t)
-        return at[t] - quadratic - at[0.5] * 4 * t * (1 - t)
+        parabola = at[1.0] * t * (2 * t - 1) + at[0.0] * (1 - t) * (1 - 2 * t)
+        return at[t] - parabola - at[0.5] * 4 * t * (1 - t)
 
     # Li Lj (Li - Lj) is 3/32 at Li = 3/4 and -3/32 at 1/4.
     coefficient = (rest(0.75) - rest(0.25)) / 2 * (32 / 3)
-    new = surplus.fixed[edge] & ~taken[edge] & np.isfinite(coefficient)
-    result[edge] = np.where(new, factor * coefficient, result[edge])
-    taken[edge] = True
+    is_new = surplus.fixed[edge] & ~is_taken[edge] & np.isfinite(coefficient)
+    result[edge] = np.where(is_new, factor * coefficient, result[edge])
+    is_taken[edge] = True
 
 
 __all__ = []

@@ -131,11 +131,11 @@ def evaluate_law(
             of_part = evaluate_law(part, dK_eq[rows], R[rows], crack, place, size)
             rate[rows] = np.maximum(rate[rows], of_part)
         return rate
-    needs = law_needs(law, dK_eq, R, a)
+    arguments = law_needs(law, dK_eq, R, a)
     result = call_function(
-        partial(law, **needs), f"the growth rates of crack {crack}", dK_eq.copy(), R.copy()
+        partial(law, **arguments), f"the growth rates of crack {crack}", dK_eq.copy(), R.copy()
     )
-    rate = np.array(numbers(result, "the growth rate that the law returned", finite=False))
+    rate = np.array(numbers(result, "the growth rate that the law returned", must_be_finite=False))
     if rate.shape != dK_eq.shape:
         raise ProblemError(
             f"the law returned shape {rate.shape} for {len(dK_eq)} {place}s; it must return one "
@@ -161,9 +161,9 @@ def law_needs(law: Law, dK_eq: Floats, R: Floats, a: Floats | None) -> dict[str,
         It asks for something that there is not.
     """
     needs = getattr(law, "needs", ())
-    unknown = [name for name in needs if name not in NEEDS]
-    if unknown:
-        raise ProblemError(f"the law needs {unknown}: it can be given {', '.join(NEEDS)}.")
+    unknown_names = [name for name in needs if name not in NEEDS]
+    if unknown_names:
+        raise ProblemError(f"the law needs {unknown_names}: it can be given {', '.join(NEEDS)}.")
     values: dict[str, Floats] = {}
     if "a" in needs:
         values["a"] = np.ones(len(dK_eq)) if a is None else a.copy()

@@ -140,9 +140,9 @@ class newman_closure(Closure):  # noqa: N801
         A0, A1, A2, A3 = self.A
         ratio = stress_ratio("newman_closure", R)
         part = np.maximum(ratio, 0.0)
-        above = np.maximum(part, A0 + part * (A1 + part * (A2 + part * A3)))
-        below = A0 + A1 * np.maximum(ratio, _LOWEST)
-        return np.asarray(np.where(ratio >= 0, above, below))[()]
+        at_positive_R = np.maximum(part, A0 + part * (A1 + part * (A2 + part * A3)))
+        at_negative_R = A0 + A1 * np.maximum(ratio, _LOWEST)
+        return np.asarray(np.where(ratio >= 0, at_positive_R, at_negative_R))[()]
 
     def __call__(self, R: ArrayLike) -> Floats:
         """Share of the range that opens the crack, in [0, 1]; 1 for R = 1."""
@@ -160,11 +160,11 @@ class newman_closure(Closure):  # noqa: N801
 
 def _check_range(name: str, R: ArrayLike, bounds: Bounds) -> Floats:
     ratio = numbers(R, f"{name}: R")
-    outside = (ratio < bounds[0]) | (ratio > bounds[1])
-    if outside.any():
+    is_outside = (ratio < bounds[0]) | (ratio > bounds[1])
+    if is_outside.any():
         raise ProblemError(
-            f"{name}: R = {ratio[outside].flat[0]:.6g} is outside {bounds[0]:g} to {bounds[1]:g}, "
-            "where U was measured: take another closure for it."
+            f"{name}: R = {ratio[is_outside].flat[0]:.6g} is outside {bounds[0]:g} to "
+            f"{bounds[1]:g}, where U was measured: take another closure for it."
         )
     return ratio
 

@@ -34,7 +34,7 @@ def columns_of_K(value: Any, what: str = "K", error: type[XcrackError] = Problem
 
 def states_of_K(value: Any, what: str, error: type[XcrackError]) -> Floats:
     """K of load states as `(s, f, 2 or 3)` array of finite numbers."""
-    K = numbers(value, what, finite=False, error=error)
+    K = numbers(value, what, must_be_finite=False, error=error)
     if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
         raise error(
             f"{what}: a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
@@ -289,12 +289,12 @@ def clipped_K(K: ArrayLike) -> Floats:
 def _flagged_K(K: Floats) -> Floats:
     """K with K_I >= 0; a warning where faces overlap."""
     # A closed tip has K_I = 0 up to discretisation: only a real overlap triggers a warning.
-    negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
-    if negative.any():
-        state, point = np.unravel_index(np.argmin(K[..., 0]), negative.shape)
+    is_negative = K[..., 0] < -_CLOSED * np.abs(K).max(initial=0.0)
+    if is_negative.any():
+        state, point = np.unravel_index(np.argmin(K[..., 0]), is_negative.shape)
         warn(
-            f"K_I < 0 in {np.count_nonzero(negative)} of {negative.size} values counts as 0; the "
-            f"smallest is {K[state, point, 0]:.4g} (state {state}, front point {point}). With "
+            f"K_I < 0 in {np.count_nonzero(is_negative)} of {is_negative.size} values counts as 0; "
+            f"the smallest is {K[state, point, 0]:.4g} (state {state}, front point {point}). With "
             "contact it is discretisation error; without, the crack faces overlap there."
         )
     return clipped_K(K)
@@ -308,8 +308,8 @@ def _sum(values: Floats) -> Floats:
 def _angle_of_largest(score: Floats, angle: Floats) -> Floats:
     """Angle `(f,)` of the state with the largest score `(s, f)`; the smallest of those that tie."""
     largest = score.max(axis=0)
-    tied = score >= largest - _TIE * np.abs(score).max(axis=0)
-    return np.asarray(np.where(tied, angle, np.inf).min(axis=0))
+    is_tied = score >= largest - _TIE * np.abs(score).max(axis=0)
+    return np.asarray(np.where(is_tied, angle, np.inf).min(axis=0))
 
 
 def _angle_and_range(
@@ -324,14 +324,14 @@ def _angle_and_range(
     if range == "component":
         return angle, component, R
     gap = np.abs(component - difference)
-    apart = gap > _DIFFER * np.maximum(component, difference)
-    if apart.any():
+    is_apart = gap > _DIFFER * np.maximum(component, difference)
+    if is_apart.any():
         point = int(np.argmax(gap))
         warn(
             f"the difference of the extreme K_eq ({difference[point]:.4g}) and the K_eq of the "
             f"difference of two states ({component[point]:.4g}) are more than 20 % apart at "
-            f"{np.count_nonzero(apart)} of {len(apart)} front points (first at {point}): a mode "
-            'is reversed within the cycle; range="component" takes the second.'
+            f"{np.count_nonzero(is_apart)} of {len(is_apart)} front points (first at {point}): a "
+            'mode is reversed within the cycle; range="component" takes the second.'
         )
     return angle, difference, R
 
@@ -381,9 +381,9 @@ def nominal_range(K: Floats, angle: Floats, nu: float | Floats) -> tuple[Floats,
     if K.shape[-1] == 3:
         K_eq = np.where(K_eq >= 0, np.hypot(K_eq, K[..., 2] / np.sqrt(1 - nu)), K_eq)
     largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
-    opens = largest > 0
-    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=opens)
-    return np.where(opens, largest - smallest, 0.0), R
+    is_opening = largest > 0
+    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=is_opening)
+    return np.where(is_opening, largest - smallest, 0.0), R
 
 
 # --- K at the tip of a kink of no length, and where a criterion turns it no further ---
@@ -442,13 +442,13 @@ def limit_angles(turn: Turn, K: Floats) -> tuple[Floats, Bools]:
         Elsewhere there is no such angle within 100 degrees.
     """
     angle = np.zeros(K.shape[1])
-    more = np.full(K.shape[1], np.inf)
+    turn_left = np.full(K.shape[1], np.inf)
     for _ in range(_PASSES):
-        more = turn(kinked_K(K, angle))
-        angle = np.clip(angle + more, -_MOST, _MOST)
-        if (np.abs(more) < _ROUND_OFF).all():
+        turn_left = turn(kinked_K(K, angle))
+        angle = np.clip(angle + turn_left, -_MOST, _MOST)
+        if (np.abs(turn_left) < _ROUND_OFF).all():
             break
-    return angle, (np.abs(more) < _CONVERGED) & (np.abs(angle) < _MOST)
+    return angle, (np.abs(turn_left) < _CONVERGED) & (np.abs(angle) < _MOST)
 
 
 def _series() -> tuple[Floats, ...]:

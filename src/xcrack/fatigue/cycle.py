@@ -125,7 +125,7 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
     """
     a0, a1 = numbers(a0, "crack length a0"), numbers(a1, "crack length a1")
     rate0 = numbers(rate0, "growth rate rate0")
-    rate1 = numbers(rate1, "growth rate rate1", finite=False)
+    rate1 = numbers(rate1, "growth rate rate1", must_be_finite=False)
     try:
         np.broadcast_shapes(a0.shape, a1.shape, rate0.shape, rate1.shape)
     except ValueError as error:
@@ -140,10 +140,10 @@ def cycles_between(a0: ArrayLike, a1: ArrayLike, rate0: ArrayLike, rate1: ArrayL
             f"growth rates {rate0} (before) and {rate1} (after) must be positive and not negative."
         )
     x = np.log1p((a1 - a0) / a0)
-    stops, breaks = rate1 == 0, np.isinf(rate1)
-    q = x - np.log(np.where(stops | breaks, 1.0, rate1 / rate0))
+    stops, is_break = rate1 == 0, np.isinf(rate1)
+    q = x - np.log(np.where(stops | is_break, 1.0, rate1 / rate0))
     by_first_rate = (a1 - a0) / rate0
-    by_power = np.where(breaks, 0.5 * by_first_rate, a0 / rate0 * x * exprel(q))
+    by_power = np.where(is_break, 0.5 * by_first_rate, a0 / rate0 * x * exprel(q))
     return np.asarray(np.where(stops, 2 * by_first_rate, by_power))[()]
 
 

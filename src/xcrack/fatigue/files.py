@@ -91,10 +91,10 @@ def read_spectrum(
     return _spectrum_of(file, factors=data[:, k], unit=unit)
 
 
-def _spectrum_of(file: Path, **given: Any) -> Spectrum:
+def _spectrum_of(file: Path, **arguments: Any) -> Spectrum:
     """A spectrum of numbers of a file, which errors name."""
     try:
-        return Spectrum(**given)
+        return Spectrum(**arguments)
     except ProblemError as error:
         raise ProblemError(f"{file}: {error}") from error
 

@@ -48,16 +48,16 @@ class Constants(Declared):
         3.16228e-13
         """
         by_K, by_length = factors(units, new)
-        changed: dict[str, Any] = {}
+        converted: dict[str, Any] = {}
         for name, argument in arguments_of(type(self)).items():
             value = getattr(self, name)
             if isinstance(value, Constants):
-                changed[name] = value.to(units, new)
+                converted[name] = value.to(units, new)
                 continue
             unit = argument.unit_of(self)
             if value is not None and unit not in (None, NUMBER):
-                changed[name] = _times(value, _factor(unit, by_K, by_length))
-        return replace(self, **changed)  # type: ignore[type-var]
+                converted[name] = _times(value, _factor(unit, by_K, by_length))
+        return replace(self, **converted)  # type: ignore[type-var]
 
 
 def per_range(law: Any) -> Dimension:
@@ -233,26 +233,30 @@ class GrowthLaw(Constants):
         if self.threshold is None:
             result = rate(dK)
         else:
-            least = np.broadcast_to(self.threshold.value(ratio, size, self.closure), dK.shape)
-            result = np.where(dK > least, _growth_above(rate, dK, least, self.approach), 0.0)
+            threshold_range = np.broadcast_to(
+                self.threshold.value(ratio, size, self.closure), dK.shape
+            )
+            result = np.where(
+                dK > threshold_range, _growth_above(rate, dK, threshold_range, self.approach), 0.0
+            )
         if self.K_c is not None:
-            breaks = largest_K(dK, ratio) >= self.K_c
-            inside = np.where(breaks, 0.0, dK)
-            result = np.where(breaks, np.inf, result * self.rise(inside, ratio))
+            is_break = largest_K(dK, ratio) >= self.K_c
+            range_below = np.where(is_break, 0.0, dK)
+            result = np.where(is_break, np.inf, result * self.rise(range_below, ratio))
         return np.asarray(result)[()]
 
 
 def _growth_above(
-    rate: Callable[[Floats], Floats], dK: Floats, least: Floats, approach: str | float
+    rate: Callable[[Floats], Floats], dK: Floats, threshold_range: Floats, approach: str | float
 ) -> Floats:
     """Growth above a threshold; anything below."""
     if approach == "cut":
         return rate(dK)
     if approach == "difference":
-        return rate(dK) - rate(least)
+        return rate(dK) - rate(threshold_range)
     if approach == "shift":
-        return rate(np.maximum(dK - least, 0.0))
-    share = np.divide(least, dK, out=np.ones(dK.shape), where=dK > 0)
+        return rate(np.maximum(dK - threshold_range, 0.0))
+    share = np.divide(threshold_range, dK, out=np.ones(dK.shape), where=dK > 0)
     return np.asarray(rate(dK) * np.maximum(1 - share, 0.0) ** float(approach))
 
 
@@ -284,9 +288,9 @@ def range_and_ratio(
             "each range, or one for all."
         ) from error
     if (dK < 0).any() or (ratio > 1 + ROUND_OFF).any():
-        least, most = dK.min(initial=np.inf), ratio.max(initial=-np.inf)
+        least_range, largest_ratio = dK.min(initial=np.inf), ratio.max(initial=-np.inf)
         raise ProblemError(
-            f"{name}: dK_eq from {least:.6g} and R up to {most:.6g}: a range is not "
+            f"{name}: dK_eq from {least_range:.6g} and R up to {largest_ratio:.6g}: a range is not "
             "negative, and R = K_min / K_max is at most 1; check both, and their order."
         )
     if bounds is not None:
@@ -296,9 +300,9 @@ def range_and_ratio(
 
 def _check_within(name: str, dK: Floats, ratio: Floats, bounds: Bounds) -> None:
     low, high = bounds
-    outside = (dK > 0) & ((ratio < low - ROUND_OFF) | (ratio > high + ROUND_OFF))
-    if outside.any():
-        first = np.broadcast_to(ratio, outside.shape)[outside].flat[0]
+    is_outside = (dK > 0) & ((ratio < low - ROUND_OFF) | (ratio > high + ROUND_OFF))
+    if is_outside.any():
+        first = np.broadcast_to(ratio, is_outside.shape)[is_outside].flat[0]
         raise ProblemError(
             f"{name}: R = {first:.6g} is outside {low:g} to {high:g}, where its constants were "
             "fitted: take a law for this R, or give another R_range if you know that they hold."
@@ -319,13 +323,13 @@ def sizes(name: str, a: ArrayLike | None, shape: tuple[int, ...] | None) -> Floa
     """Crack sizes for ranges of a shape (None: of any), where they are given."""
     if a is None:
         return None
-    given = numbers(a, f"{name}: a")
-    if given.ndim and shape is not None and given.shape != shape:
+    length = numbers(a, f"{name}: a")
+    if length.ndim and shape is not None and length.shape != shape:
         raise ProblemError(
-            f"{name}: a has the shape {given.shape}: give one crack size for each range, of shape "
+            f"{name}: a has the shape {length.shape}: give one crack size for each range, of shape "
             f"{shape}, or one for all."
         )
-    return given
+    return length
 
 
 def power_of(name: str, C: Floats | float, base: Floats, m: Floats | float) -> Floats:
@@ -408,8 +412,8 @@ class LawSets:
         ProblemError
             A material without a law, or a law without a material.
         """
-        given = [name for name, _ in self.laws]
-        check_set_names(given, names, "law", "laws", "a law")
+        set_names = [name for name, _ in self.laws]
+        check_set_names(set_names, names, "law", "laws", "a law")
 
 
 __all__ = [

@@ -104,10 +104,10 @@ def law(
     >>> print(f"{rate(500 / 1000**0.5, 0.1) * 1000:.4g} mm")
     2.36e-05 mm
     """
-    published = _presets()
-    if name not in published:
+    presets = _presets()
+    if name not in presets:
         raise ProblemError(
-            f"law: no preset {value_text(name)}: give one of {', '.join(map(repr, published))}."
+            f"law: no preset {value_text(name)}: give one of {', '.join(map(repr, presets))}."
         )
     units_of_model = Units.read(units)
     if not units_of_model.consistent:
@@ -115,7 +115,7 @@ def law(
             f"law: units = {value_text(units)}: K has the root of another length, which no model "
             f"has: give one length, such as m, MPa√m."
         )
-    preset = published[name]
+    preset = presets[name]
     return _in_ratio(preset.law, ratio).to(preset.units, units)
 
 
@@ -144,8 +144,8 @@ def law_of_constants(kind: str, entry: Mapping[str, Any], R_range: Bounds | None
 def _law_of_entry(name: str, entry: Mapping[str, Any]) -> Preset:
     bounds = tuple(entry["R_range"]) if "R_range" in entry else None
     texts = {key: entry[key] for key in ("units", "material", "environment", "source", "checked")}
-    made = law_of_constants(entry["law"], entry, bounds)
-    return Preset(name, made, R_range=bounds, **texts)
+    law_with_bounds = law_of_constants(entry["law"], entry, bounds)
+    return Preset(name, law_with_bounds, R_range=bounds, **texts)
 
 
 _MODEL = "give length and K of the model, such as mm, MPa√mm or in, ksi√in"
@@ -207,15 +207,15 @@ class Metal:
         ProblemError
             No source has E or nu, and it is not given either; no toughness, as of `K_c`.
         """
-        elastic = {"E": self.E if E is None else E, "nu": self.nu if nu is None else nu}
-        missing = [name for name, value in elastic.items() if value is None]
-        if missing:
+        constants = {"E": self.E if E is None else E, "nu": self.nu if nu is None else nu}
+        missing_names = [name for name, value in constants.items() if value is None]
+        if missing_names:
             raise ProblemError(
-                f"material {self.name!r}: no source with {' and '.join(missing)} was read: "
-                f"give {', '.join(f'isotropic({name}=...)' for name in missing)}."
+                f"material {self.name!r}: no source with {' and '.join(missing_names)} was read: "
+                f"give {', '.join(f'isotropic({name}=...)' for name in missing_names)}."
             )
         K_c = None if thickness is None else self.K_c(thickness)
-        return Isotropic(**elastic, plane=plane, yield_stress=self.yield_stress, K_c=K_c)  # type: ignore[arg-type]
+        return Isotropic(**constants, plane=plane, yield_stress=self.yield_stress, K_c=K_c)  # type: ignore[arg-type]
 
     @check_arguments()
     def K_c(self, thickness: Annotated[float, Number(above=0, unit=LENGTH)]) -> float:
@@ -229,8 +229,8 @@ class Metal:
         ProblemError
             A thickness that is not positive, or no source has such a toughness.
         """
-        for tested, K_c in self.toughness:
-            if thickness <= tested * (1 + 1e-9):
+        for tested_thickness, K_c in self.toughness:
+            if thickness <= tested_thickness * (1 + 1e-9):
                 return K_c
         if self.K_Ic is None:
             raise ProblemError(
@@ -356,10 +356,10 @@ def material(
     """
     names = _data()["metals"]
     if name not in names:
-        alike = difflib.get_close_matches(name, names, n=5, cutoff=0.4) or list(names)
+        similar_names = difflib.get_close_matches(name, names, n=5, cutoff=0.4) or list(names)
         raise ProblemError(
             f"material: name = {value_text(name)} is not among those with sources: give one of "
-            f"{', '.join(map(repr, alike))} (xc.materials() has all), or "
+            f"{', '.join(map(repr, similar_names))} (xc.materials() has all), or "
             f"xc.Isotropic and a law with values of your own."
         )
     target = Units.read(units)
@@ -397,8 +397,8 @@ def _source(text: str) -> str:
     document = _data()["sources"][key]
     if not place:
         return str(document)
-    title, _, quoted = document.partition("; ")
-    return f"{title}, {place}; {quoted}"
+    title, _, quotation = document.partition("; ")
+    return f"{title}, {place}; {quotation}"
 
 
 def _unit(name: str, stress: str, K: str) -> str:

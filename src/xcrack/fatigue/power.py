@@ -210,8 +210,8 @@ class walker(GrowthLaw):  # noqa: N801 - it is used as a function
         if self.gamma_minus is not None:
             gamma = np.where(R < 0, self.gamma_minus, self.gamma)
         with np.errstate(over="ignore"):
-            effective = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
-        return power_of("walker", self.C, effective, self.m)
+            effective_range = np.where(dK > 0, dK / share ** (1.0 - gamma), 0.0)
+        return power_of("walker", self.C, effective_range, self.m)
 
 
 @dataclass(frozen=True)

@@ -51,12 +51,12 @@ class plastic_zone(Constants):  # noqa: N801 - it is used as a function
 
     def __call__(self, K: ArrayLike) -> Floats:
         """Size for K, length."""
-        given = numbers(K, "plastic_zone: K")
-        if np.abs(given).max(initial=0.0) > _LARGEST:
+        values = numbers(K, "plastic_zone: K")
+        if np.abs(values).max(initial=0.0) > _LARGEST:
             raise ProblemError(
-                f"plastic_zone: K = {np.abs(given).max():.3g} has no square: take another unit."
+                f"plastic_zone: K = {np.abs(values).max():.3g} has no square: take another unit."
             )
-        return np.asarray(self.factor * given**2)[()]
+        return np.asarray(self.factor * values**2)[()]
 
     @property
     def factor(self) -> float:
@@ -92,10 +92,10 @@ class wheeler(Constants):  # noqa: N801
     def factor(self, K: ArrayLike, K_overload: ArrayLike, da: ArrayLike) -> Floats:
         """Factor on the rate for K, after growth by da since an overload."""
         zone_size = self.zone(K)
-        remaining = self.zone(K_overload) - numbers(da, "wheeler: da")
-        inside = remaining > zone_size
+        distance_left = self.zone(K_overload) - numbers(da, "wheeler: da")
+        is_inside = distance_left > zone_size
         share = np.divide(
-            zone_size, remaining, out=np.ones_like(remaining + zone_size), where=inside
+            zone_size, distance_left, out=np.ones_like(distance_left + zone_size), where=is_inside
         )
         return np.asarray(share**self.w)[()]
 
@@ -133,7 +133,7 @@ class willenborg(Constants):  # noqa: N801
         self, K_min: ArrayLike, K_max: ArrayLike, K_overload: ArrayLike, da: ArrayLike
     ) -> Floats:
         """Reduction of K, after growth by da since an overload, stress √length."""
-        low, high, over, grown = (
+        low, high, K_of_overload, growth = (
             numbers(value, f"willenborg: {name}")
             for name, value in zip(
                 ("K_min", "K_max", "K_overload", "da"), (K_min, K_max, K_overload, da)
@@ -142,8 +142,8 @@ class willenborg(Constants):  # noqa: N801
         dK = high - low
         share = np.divide(self.dK_th, dK, out=np.ones_like(dK), where=dK > 0)
         phi = np.maximum(1 - share, 0.0) / (self.shutoff - 1)
-        remaining = np.maximum(1 - grown / self.zone(over), 0.0)
-        return np.asarray(np.maximum(phi * (over * np.sqrt(remaining) - high), 0.0))[()]
+        share_left = np.maximum(1 - growth / self.zone(K_of_overload), 0.0)
+        return np.asarray(np.maximum(phi * (K_of_overload * np.sqrt(share_left) - high), 0.0))[()]
 
 
 Retardation = wheeler | willenborg
@@ -193,8 +193,8 @@ class RetardationSets:
         ProblemError
             A material without a model, or a model without a material.
         """
-        given = [name for name, _ in self.models]
-        check_set_names(given, names, "retardation", "models", "one")
+        set_names = [name for name, _ in self.models]
+        check_set_names(set_names, names, "retardation", "models", "one")
 
 
 # What growth cycle by cycle goes from, and what it gives.
@@ -253,20 +253,20 @@ class BlockCycles:
         """Range, ratio and size."""
         return self.dK, self.R, self.a
 
-    def rows(self, which: slice | Bools) -> "BlockCycles":
+    def rows(self, rows: slice | Bools) -> "BlockCycles":
         """Some of the solves."""
-        return BlockCycles(self.dK[which], self.R[which], self.a[which], self.sets)
+        return BlockCycles(self.dK[rows], self.R[rows], self.a[rows], self.sets)
 
     def at(self, places: Bools | Ints) -> "BlockCycles":
         """Some of the places."""
         sets = None if self.sets is None else self.sets[places]
         return BlockCycles(self.dK[:, places], self.R[:, places], self.a[:, places], sets)
 
-    def followed_by(self, later: "BlockCycles", most: int) -> "BlockCycles":
+    def followed_by(self, block: "BlockCycles", most_cycles: int) -> "BlockCycles":
         """With later solves, of all at most the last few, in the materials of the later ones."""
-        parts = zip(self.arrays, later.arrays)
-        dK, R, a = (np.concatenate(pair)[-most:] for pair in parts)
-        return BlockCycles(dK, R, a, later.sets)
+        parts = zip(self.arrays, block.arrays)
+        dK, R, a = (np.concatenate(pair)[-most_cycles:] for pair in parts)
+        return BlockCycles(dK, R, a, block.sets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -359,18 +359,18 @@ def march(
         models = model.at([names[0]] * n if material is None else material.tolist())
     first = models[0] if models else None
     if isinstance(first, willenborg):
-        fits = _TABLE // max(k * n * p, 1)
-        shifts = np.linspace(0, 1, int(np.clip(fits, _FEWEST, _SHIFTS)))
+        shifts_that_fit = _TABLE // max(k * n * p, 1)
+        shifts = np.linspace(0, 1, int(np.clip(shifts_that_fit, _FEWEST, _SHIFTS)))
     rate = cycle_rates(law, cycles, shifts, threshold, material)
-    most = rate.max(axis=0)
-    root = np.asarray((rate <= _TINY * most).any(axis=0))
+    largest_rate = rate.max(axis=0)
+    root = np.asarray((rate <= _TINY * largest_rate).any(axis=0))
     with np.errstate(divide="ignore"):
         values = np.where(root, rate ** (1 / exponent), np.log(np.maximum(rate, _SMALLEST)))
-    least = np.array([getattr(one, "dK_th", 0.0) for one in models])[None, :, None]
-    share = np.divide(least, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
-    since, size, over = np.array(zones.since), np.array(zones.size), np.array(zones.K)
-    arc, elapsed = np.zeros(x.shape), np.zeros(len(x))
-    reached, position, part, _ = march_places(
+    threshold_range = np.array([getattr(one, "dK_th", 0.0) for one in models])[None, :, None]
+    share = np.divide(threshold_range, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
+    since, size, zone_K = np.array(zones.since), np.array(zones.size), np.array(zones.K)
+    arc, cycles_elapsed = np.zeros(x.shape), np.zeros(len(x))
+    length_reached, position, part, _ = march_places(
         length,
         min(blocks * len(order), _MOST / max(n, 1)),
         _LEAST * length,
@@ -388,15 +388,17 @@ def march(
         np.array([getattr(one, "shutoff", 2.0) for one in models]),
         since,
         size,
-        over,
+        zone_K,
         zones.position,
         zones.part,
         arc,
-        elapsed,
+        cycles_elapsed,
     )
-    after = OverloadZones(since, size, over, int(position), float(part))
+    zones_after = OverloadZones(since, size, zone_K, int(position), float(part))
     sigma = np.linspace(0.0, length, len(x))
-    return CycleIntegration(sigma, arc, elapsed / len(order), float(reached), after)
+    return CycleIntegration(
+        sigma, arc, cycles_elapsed / len(order), float(length_reached), zones_after
+    )
 
 
 def cycle_rates(
@@ -414,8 +416,8 @@ def cycle_rates(
     R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
     R = np.where(shifts == 0, cycles.R[..., None], np.minimum(R, 1.0))
     a = np.broadcast_to(cycles.a[..., None, None], dK.shape)
-    flat = (np.ascontiguousarray(each).ravel() for each in (dK, R, a))
-    dK_, R_, a_ = flat
+    columns = (np.ascontiguousarray(each).ravel() for each in (dK, R, a))
+    dK_, R_, a_ = columns
     names = None
     if material is not None and isinstance(law, LawSets):
         names = np.broadcast_to(material[None, :, None, None], dK.shape).ravel()
@@ -441,14 +443,14 @@ def _line_weights(nodes: Floats, x: Floats) -> Floats:
     if k == 1:
         return result + 1.0
     for j in range(k - 1):
-        inside = np.ones(x.shape, dtype=bool)
+        is_inside = np.ones(x.shape, dtype=bool)
         if j > 0:
-            inside &= x >= nodes[j]
+            is_inside &= x >= nodes[j]
         if j < k - 2:
-            inside &= x < nodes[j + 1]
+            is_inside &= x < nodes[j + 1]
         t = (x - nodes[j]) / (nodes[j + 1] - nodes[j])
-        result[:, j] += np.where(inside, 1 - t, 0.0)
-        result[:, j + 1] += np.where(inside, t, 0.0)
+        result[:, j] += np.where(is_inside, 1 - t, 0.0)
+        result[:, j + 1] += np.where(is_inside, t, 0.0)
     return result
 
 

@@ -40,10 +40,10 @@ def turning_points(values: Floats) -> Ints:
     (k,) array of int
         In order; of equal neighbours the first. Empty where nothing varies.
     """
-    different = np.nonzero(values != np.roll(values, 1))[0]
-    x = values[different]
+    is_turning = np.nonzero(values != np.roll(values, 1))[0]
+    x = values[is_turning]
     turns = (x > np.roll(x, 1)) != (np.roll(x, -1) > x)  # neighbours differ
-    return np.asarray(different[turns], dtype=np.int64)
+    return np.asarray(is_turning[turns], dtype=np.int64)
 
 
 def closed_cycles(values: Floats) -> list[tuple[int, int]]:
@@ -74,8 +74,8 @@ def closed_cycles(values: Floats) -> list[tuple[int, int]]:
     for point in order:
         stack.append(point)
         while len(stack) >= 3:
-            first, second, third = x[stack[-3]], x[stack[-2]], x[stack[-1]]
-            if abs(third - second) < abs(second - first):
+            first, second, third_value = x[stack[-3]], x[stack[-2]], x[stack[-1]]
+            if abs(third_value - second) < abs(second - first):
                 break
             pairs.append((stack[-3], stack[-2]))
             del stack[-3:-1]
@@ -342,10 +342,10 @@ class Spectrum(Declared):
 def distinct_cycles(cycles: NDArray[Any]) -> tuple[Floats, Floats, Ints]:
     """Pairs (min, max) that differ `(p, 2)`, count of each `(p,)`, and which each cycle is."""
     pairs = np.stack([cycles["min"], cycles["max"]], axis=1)
-    values, which = np.unique(pairs, axis=0, return_inverse=True)
-    which = which.reshape(-1)
-    count = np.bincount(which, weights=cycles["count"], minlength=len(values)).astype(float)
-    return values, count, which.astype(np.int64)
+    values, number = np.unique(pairs, axis=0, return_inverse=True)
+    number = number.reshape(-1)
+    count = np.bincount(number, weights=cycles["count"], minlength=len(values)).astype(float)
+    return values, count, number.astype(np.int64)
 
 
 __all__ = [

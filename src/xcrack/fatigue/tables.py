@@ -26,16 +26,16 @@ class Curve(NamedTuple):
 
 def checked_curves(value: Any, what: str, error: type[XcrackError]) -> tuple[Curve, ...]:
     """Curves by rising R, checked: a mapping, or those of another table."""
-    given: list[tuple[Any, Any]] = []
+    curves: list[tuple[Any, Any]] = []
     if isinstance(value, Mapping):
-        given = list(value.items())
+        curves = list(value.items())
     elif isinstance(value, tuple):  # a law that is made from another one
         parts = [curve for curve in value if isinstance(curve, tuple) and len(curve) == 3]
         if len(parts) == len(value):
-            given = [(R, (dK, rate)) for R, dK, rate in parts]
-    if not given:
+            curves = [(R, (dK, rate)) for R, dK, rate in parts]
+    if not curves:
         raise error(f"{what}: give a dict of R to (dK, rate).")
-    return tuple(sorted(_curve(R, points, what, error) for R, points in given))
+    return tuple(sorted(_curve(R, points, what, error) for R, points in curves))
 
 
 def _curve(R: Any, points: Any, what: str, error: type[XcrackError]) -> Curve:
@@ -47,8 +47,8 @@ def _curve(R: Any, points: Any, what: str, error: type[XcrackError]) -> Curve:
         raise error(f"{what}: curve of R = {ratio:g}: give (dK, rate).") from None
     dK = numbers(dK, f"{what}: dK of R = {ratio:g}", (None,), error=error)
     rate = numbers(rate, f"{what}: rate of R = {ratio:g}", (len(dK),), error=error)
-    rises = all(len(x) > 1 and x[0] > 0 and (np.diff(x) > 0).all() for x in (dK, rate))
-    if not rises:
+    is_rising = all(len(x) > 1 and x[0] > 0 and (np.diff(x) > 0).all() for x in (dK, rate))
+    if not is_rising:
         raise error(
             f"{what}: curve of R = {ratio:g}: give two or more points, ranges and rates "
             "positive and rising."
@@ -123,8 +123,8 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
 
     def rate(self, dK: Floats, R: Floats) -> Floats:
         """Between the points; 0 below them and inf above."""
-        lowest, highest = self.curves[0][0], self.curves[-1][0]
-        ratio = np.clip(R, lowest, highest)
+        lowest_R, highest_R = self.curves[0][0], self.curves[-1][0]
+        ratio = np.clip(R, lowest_R, highest_R)
         result = np.zeros(dK.shape)
         is_left = np.ones(dK.shape, dtype=bool)
         for low, high in zip(self.curves, self.curves[1:] or self.curves):
@@ -184,12 +184,12 @@ def _rates_between(low: Curve, high: Curve, dK: Floats, R: Floats) -> Floats:
         x = np.log(dK)
     piece = np.clip((knots <= x[:, None]).sum(axis=1), 1, len(rates) - 1)
     row = np.arange(len(x))
-    left, right = knots[row, piece - 1], knots[row, piece]
+    left_knot, right_knot = knots[row, piece - 1], knots[row, piece]
     x_inside = np.clip(x, knots[:, 0], knots[:, -1])
-    share = (x_inside - left) / (right - left)
+    share = (x_inside - left_knot) / (right_knot - left_knot)
     rate = np.exp(rates[piece - 1] + share * (rates[piece] - rates[piece - 1]))
-    below, above = x < knots[:, 0] - _ROUND_OFF, x > knots[:, -1] + _ROUND_OFF
-    return np.asarray(np.where(below, 0.0, np.where(above, np.inf, rate)))
+    is_below, is_above = x < knots[:, 0] - _ROUND_OFF, x > knots[:, -1] + _ROUND_OFF
+    return np.asarray(np.where(is_below, 0.0, np.where(is_above, np.inf, rate)))
 
 
 __all__ = ["rate_table"]

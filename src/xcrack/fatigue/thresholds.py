@@ -93,8 +93,8 @@ class stepped_threshold(Threshold):  # noqa: N801
     def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R, stress √length."""
         low, high = self.R
-        falling = self.dK[1] - self.slope * (R - low)
-        return np.asarray(np.where(R < low, self.dK[0], np.where(R < high, falling, self.dK[2])))
+        on_slope = self.dK[1] - self.slope * (R - low)
+        return np.asarray(np.where(R < low, self.dK[0], np.where(R < high, on_slope, self.dK[2])))
 
 
 @dataclass(frozen=True)
@@ -257,12 +257,16 @@ class nasgro4_threshold(_OfNewman):  # noqa: N801
             R = np.minimum(R, self.R_clip)
         with np.errstate(over="ignore", divide="ignore"):
             by_range, open_at_0 = 1 / closure(R), 1 - closure.A[0]
-        plus, minus = self.C_th_plus, self.C_th_minus
+        exponent_plus, exponent_minus = self.C_th_plus, self.C_th_minus
         size = short_crack_factor(a, self.a0, "nasgro4_threshold")
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            above = by_range ** (1 + R * plus) / open_at_0 ** ((1 - R) * plus)
-            below = by_range ** (1 + R * minus) / open_at_0 ** (plus - R * minus)
-            value = np.asarray(self.dK1 * size * np.where(R >= 0, above, below))
+            at_positive_R = by_range ** (1 + R * exponent_plus) / open_at_0 ** (
+                (1 - R) * exponent_plus
+            )
+            at_negative_R = by_range ** (1 + R * exponent_minus) / open_at_0 ** (
+                exponent_plus - R * exponent_minus
+            )
+            value = np.asarray(self.dK1 * size * np.where(R >= 0, at_positive_R, at_negative_R))
         return _check_finite("nasgro4_threshold", value, R)
 
 

@@ -50,12 +50,12 @@ class time_rate(Constants):  # noqa: N801 - it is used as a function
 
     def __call__(self, K: ArrayLike) -> Floats:
         """Growth in a unit of time, length/time; none where K is not positive."""
-        given = np.asarray(numbers(K, "time_rate: K"))
-        acts = (given > self.K_th) & (given > 0)
-        rate = power_of("time_rate", self.C, np.where(acts, given, 1.0), self.n)
+        values = np.asarray(numbers(K, "time_rate: K"))
+        is_above = (values > self.K_th) & (values > 0)
+        rate = power_of("time_rate", self.C, np.where(is_above, values, 1.0), self.n)
         if self.plateau is not None:
             rate = np.minimum(rate, self.plateau)
-        return np.asarray(np.where(acts, rate, 0.0))[()]
+        return np.asarray(np.where(is_above, rate, 0.0))[()]
 
 
 @dataclass(frozen=True)

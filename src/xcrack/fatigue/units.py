@@ -74,10 +74,10 @@ def _K_of(text: str, full_text: str) -> tuple[float, float]:
     return _STRESSES[stress.rstrip("*·")] * np.sqrt(_LENGTHS[length]), _LENGTHS[length]
 
 
-def factors(units: str, new: str) -> tuple[float, float]:
+def factors(units: str, new_units: str) -> tuple[float, float]:
     """What a K and a length are multiplied by from one set of units to another."""
-    before, after = Units.read(units), Units.read(new)
-    return before.K / after.K, before.length / after.length
+    old_system, new_system = Units.read(units), Units.read(new_units)
+    return old_system.K / new_system.K, old_system.length / new_system.length
 
 
 __all__ = ["Units", "factors"]

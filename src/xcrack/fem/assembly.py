@@ -102,17 +102,17 @@ def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     corners = mesh.dim + 1
     is_end = np.repeat(mesh.cells[cells], corners, axis=0)[:, :, None] == ends[inverse][:, None, :]
     local = is_end.argmax(axis=1)
-    inward = mesh.gradient[cells].reshape(-1, mesh.dim)
-    outward = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
+    inward_normal = mesh.gradient[cells].reshape(-1, mesh.dim)
+    outward_normal = -inward_normal / np.linalg.norm(inward_normal, axis=1, keepdims=True)
     bary = np.zeros((len(owner), corners))
     bary[np.arange(len(owner))[:, None], local[owner]] = at[point]
-    normal = outward[owner] * weight[point, None]
+    normal = outward_normal[owner] * weight[point, None]
     cell = cells[owner // corners]
     side = cell_side(space, cell)
     for c, cut in enumerate(space.cuts):
-        crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
+        is_crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
         side_of_part = parts.side[piece[point], c]
-        side[crossed, c] = side_of_part[crossed]
+        side[is_crossed, c] = side_of_part[is_crossed]
     return cell, bary, normal, at_joints(space, cell, bary, side)
 
 
@@ -163,7 +163,7 @@ def corrected_gradients(
     corners = mesh.points[mesh.cells[batch.cells]]
     size = mesh.cell_size[batch.cells]
     corners = (corners - corners.mean(axis=1, keepdims=True)) / size[:, None, None]
-    linear = (d, space.order) in _LINEAR
+    is_linear = (d, space.order) in _LINEAR
     parts = n_parts(space)
     piece = parts * row + part_numbers(space, batch.cells[row], side)
 
@@ -176,8 +176,8 @@ def corrected_gradients(
         inner = _moved_inward(bary_, bpiece, bary, weight, piece, n_pieces)
     bvalues = space.tip_values(batch, brow, inner, bside)
 
-    moments = moments_at(row, bary, corners, linear)
-    bmoments = moments_at(brow, bary_, corners, linear)
+    moments = moments_at(row, bary, corners, is_linear)
+    bmoments = moments_at(brow, bary_, corners, is_linear)
     count = moments.shape[1]
     defect, gram = np.zeros((n_pieces, n_tip, d, count)), np.zeros((n_pieces, count, count))
     add_flux(defect, bpiece, bvalues, boundary.normal[chosen], bmoments)
@@ -316,13 +316,13 @@ class Stiffness:
         """The sum, of all rows or of some functions `(n_functions,)`; others are empty."""
         from xcrack.fem.kernels.stiffness import joined_blocks
 
-        body, over = self.body, self.enriched
-        chosen_rows = np.ones(len(over.indptr) - 1, dtype=bool) if rows is None else rows
-        entries = body.data.size + over.data.size
+        body, blocks = self.body, self.enriched
+        chosen_rows = np.ones(len(blocks.indptr) - 1, dtype=bool) if rows is None else rows
+        entries = body.data.size + blocks.data.size
         kind = np.int32 if entries < np.iinfo(np.int32).max else np.int64
         indptr, indices, data = joined_blocks(
-            body.indptr.astype(kind, copy=False), body.indices, body.data, over.indptr,
-            over.indices, over.data, chosen_rows,
+            body.indptr.astype(kind, copy=False), body.indices, body.data, blocks.indptr,
+            blocks.indices, blocks.data, chosen_rows,
         )  # fmt: skip
         return sp.csr_matrix((data, indices, indptr), shape=self.shape)
 
@@ -347,13 +347,13 @@ def next_to_enriched(space: FunctionSpace) -> Bools:
 
     The enriched columns of a solver's basis hold standard functions of such nodes too.
     """
-    carries = np.zeros(space.n_nodes, dtype=bool)
+    has_function = np.zeros(space.n_nodes, dtype=bool)
     for number in space.heaviside:
-        carries |= number >= 0
+        has_function |= number >= 0
     for tip in space.tips:
-        carries[: space.mesh.n_points] |= tip.point_to_function >= 0
+        has_function[: space.mesh.n_points] |= tip.point_to_function >= 0
     is_enriched = np.zeros(space.n_functions, dtype=bool)
-    is_enriched[space.cell_nodes[carries[space.cell_nodes].any(axis=1)]] = True
+    is_enriched[space.cell_nodes[has_function[space.cell_nodes].any(axis=1)]] = True
     is_enriched[space.n_nodes :] = True
     return is_enriched
 
@@ -393,7 +393,7 @@ def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
 
 
 def reused_cells(
-    space: FunctionSpace, elasticity: Elasticity, cells: Ints, earlier: ReusedCells | None
+    space: FunctionSpace, elasticity: Elasticity, cells: Ints, previous_cells: ReusedCells | None
 ) -> tuple[ReusedCells, int]:
     """Integrate cells with one jump, but those that are known already.
 
@@ -403,7 +403,7 @@ def reused_cells(
     elasticity : Elasticity
     cells : (m,) array of int
         Growing.
-    earlier : ReusedCells, optional
+    previous_cells : ReusedCells, optional
         Of an earlier crack in the same mesh.
 
     Returns
@@ -416,18 +416,22 @@ def reused_cells(
 
     n, key = space.cell_nodes.shape[1], _keys(space, cells)
     products = np.empty((len(cells), 2 * n * space.dim, 2 * n * space.dim))
-    old = np.zeros(len(cells), dtype=bool)
-    if earlier is not None and len(earlier.cells):
-        row = np.minimum(np.searchsorted(earlier.cells, cells), len(earlier.cells) - 1)
-        old = (earlier.cells[row] == cells) & (earlier.key[row] == key).all(axis=1)
-        products[old] = earlier.products[row[old]]
-    new = np.nonzero(~old)[0]
-    points = cell_points(space, cells[new], 0, _degree(space.order, elasticity))
+    is_known_cell = np.zeros(len(cells), dtype=bool)
+    if previous_cells is not None and len(previous_cells.cells):
+        row = np.minimum(
+            np.searchsorted(previous_cells.cells, cells), len(previous_cells.cells) - 1
+        )
+        is_known_cell = (previous_cells.cells[row] == cells) & (previous_cells.key[row] == key).all(
+            axis=1
+        )
+        products[is_known_cell] = previous_cells.products[row[is_known_cell]]
+    new_rows = np.nonzero(~is_known_cell)[0]
+    points = cell_points(space, cells[new_rows], 0, _degree(space.order, elasticity))
     weight = elasticity.weights(points.cell, points.bary, points.weight)
-    for batch, rows in space.batches(cells[new]):
+    for batch, rows in space.batches(cells[new_rows]):
         number, place, first = points.of_cells(batch.cells)
         _, G = space.tabulate(batch, place, points.bary[number], points.side[number])
-        products[new[rows]] = gradient_products(first, weight[number], G, n)
+        products[new_rows[rows]] = gradient_products(first, weight[number], G, n)
     return ReusedCells(cells, key, products), len(points.weight)
 
 
@@ -449,10 +453,10 @@ def _keys(space: FunctionSpace, cells: Ints) -> Floats:
         key[rows, 1:end] = space.cuts[c].level_set.phi[mesh.cells[cells_of_rows]]
         key[rows, end : end + nodes] = space.heaviside[c][space.cell_nodes[cells_of_rows]] >= 0
         kinks = space.cuts[c].kinks
-        _, bent, row = np.intersect1d(cells_of_rows, kinks.cells, return_indices=True)
-        if len(bent):
-            key[rows[bent], 1:end] = kinks.values[row]
-            key[rows[bent], end + nodes :] = np.nan_to_num(kinks.vertex[row])
+        _, columns, row = np.intersect1d(cells_of_rows, kinks.cells, return_indices=True)
+        if len(columns):
+            key[rows[columns], 1:end] = kinks.values[row]
+            key[rows[columns], end + nodes :] = np.nan_to_num(kinks.vertex[row])
     return key
 
 
@@ -518,17 +522,17 @@ def bulk(elasticity: Elasticity, order: int) -> Bulk:
     rows = np.linspace(0, n_nodes, number_of_threads() + 1).astype(np.int64)
     spans = list(pairwise(indptr[rows].tolist()))
 
-    def add_rows(given: tuple[Any, ...], span: tuple[int, int]) -> None:
-        add_block_stiffness(data, *span, *given)
+    def add_rows(arrays: tuple[Any, ...], span: tuple[int, int]) -> None:
+        add_block_stiffness(data, *span, *arrays)
 
     for material, cells in elasticity.groups(np.arange(len(mesh.cells))):
         factor = elasticity.factor if material.is_graded else None
         bary, weight = simplex_rule(mesh.dim, 2 * (order - 1) + material.is_graded)
-        given = (
+        bulk_arrays = (
             cells, slot, mesh.gradient, mesh.volume, shape_derivatives(order, bary), bary, weight,
             factor, *isotropic_part(material.unit.tensor(mesh.dim)),
         )  # fmt: skip
-        map_tasks(partial(add_rows, given), spans)
+        map_tasks(partial(add_rows, bulk_arrays), spans)
     if mesh.dim == 3:
         for part in row_stretches(len(data)):
             data[part] = data[part].transpose(0, 2, 1).copy()
@@ -547,7 +551,7 @@ def enriched_stiffness(
     elasticity: Elasticity,
     numerics: Numerics,
     lips: tuple[LipPoints, ...],
-    earlier: ReusedCells | None = None,
+    previous_cells: ReusedCells | None = None,
 ) -> tuple[Enriched, int, ReusedCells | None]:
     """Entries with an enriched function.
 
@@ -555,7 +559,7 @@ def enriched_stiffness(
 
     Parameters
     ----------
-    earlier : ReusedCells, optional
+    previous_cells : ReusedCells, optional
         Of an earlier crack in the same mesh.
 
     Returns
@@ -563,7 +567,7 @@ def enriched_stiffness(
     enriched : Enriched
     n_points : int
         Integration points used.
-    reusable : ReusedCells or None
+    reused : ReusedCells or None
         For the next crack.
     """
     from xcrack.fem.kernels.stiffness import add_products, add_stiffness, enriched_pattern
@@ -572,9 +576,9 @@ def enriched_stiffness(
     if not len(cells):
         indptr, indices = np.zeros(space.n_functions + 1, np.int64), np.zeros(0, np.int32)
         return Enriched(indptr, indices, np.zeros((0, d, d))), 0, None
-    simple = with_one_jump(space, cells)
-    reusable, n_points = reused_cells(space, elasticity, cells[simple], earlier)
-    others = cells[~simple]
+    has_one_jump = with_one_jump(space, cells)
+    reused, n_points = reused_cells(space, elasticity, cells[has_one_jump], previous_cells)
+    others = cells[~has_one_jump]
     points = cell_points(space, others, numerics.points, _degree(space.order, elasticity))
     with_tip = cells[space.has_tip[cells]]
     boundary = None
@@ -582,10 +586,10 @@ def enriched_stiffness(
         boundary = boundary_points(space, with_tip, lips)
     indptr, indices = enriched_pattern(_functions(space, cells), space.n_functions, space.n_nodes)
     data = np.zeros((len(indices), d, d))
-    for material, group in elasticity.groups(reusable.cells):
+    for material, group in elasticity.groups(reused.cells):
         stiffness = isotropic_part(material.unit.tensor(d))
         for batch, _ in space.batches(group):
-            products = reusable.products[np.searchsorted(reusable.cells, batch.cells)]
+            products = reused.products[np.searchsorted(reused.cells, batch.cells)]
             add_products(
                 data, indptr, indices, batch.functions, products, space.n_nodes, *stiffness
             )  # fmt: skip
@@ -612,26 +616,26 @@ def enriched_stiffness(
         for batch, _ in space.batches(group)
     )
     # Few points take less time than threads to begin.
-    few = len(points.weight) <= _CHUNK
-    tables = map(tabulated, tasks) if few else stream_tasks(tabulated, tasks)
+    is_one_chunk = len(points.weight) <= _CHUNK
+    tables = map(tabulated, tasks) if is_one_chunk else stream_tasks(tabulated, tasks)
     for material, functions, first, weight, G in tables:
         with one_blas_thread():
             stiffness = isotropic_part(material.unit.tensor(d))
             add_stiffness(
                 data, indptr, indices, functions, first, weight, G, space.n_nodes, *stiffness
             )  # fmt: skip
-    return Enriched(indptr, indices, data), n_points + len(points.weight), reusable
+    return Enriched(indptr, indices, data), n_points + len(points.weight), reused
 
 
 def _functions(space: FunctionSpace, cells: Ints) -> Ints:
     """Functions that act on cells, in rows of one length."""
     parts = [batch.functions for batch, _ in space.batches(cells)]
-    filled = np.full((len(cells), max(part.shape[1] for part in parts)), -1, dtype=np.int64)
+    table = np.full((len(cells), max(part.shape[1] for part in parts)), -1, dtype=np.int64)
     first = 0
     for part in parts:
-        filled[first : first + len(part), : part.shape[1]] = part
+        table[first : first + len(part), : part.shape[1]] = part
         first += len(part)
-    return filled
+    return table
 
 
 def _chunks(space: FunctionSpace, points: Points, cells: Ints) -> list[Ints]:
@@ -640,9 +644,9 @@ def _chunks(space: FunctionSpace, points: Points, cells: Ints) -> list[Ints]:
     return [cells[group == g] for g in np.unique(group)]
 
 
-def total_stiffness(bulk_: Bulk, enriched: Enriched) -> sp.csr_matrix:
+def total_stiffness(bulk_: Bulk, blocks: Enriched) -> sp.csr_matrix:
     """Stiffness of all unknowns."""
-    return Stiffness(bulk_.matrix, enriched).joined()
+    return Stiffness(bulk_.matrix, blocks).joined()
 
 
 def rigid_modes(x: Floats) -> Floats:

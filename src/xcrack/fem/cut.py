@@ -37,14 +37,14 @@ class CutEnds:
 
 
 def _cut_points(
-    mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats, exists: Bools
+    mesh: Mesh, level_set: LevelSet, cells: Ints, positions: Floats, has_position: Bools
 ) -> CutEnds:
     """The two points where phi = 0 meets the boundary of triangles in which it changes sign."""
     pairs = local_edges(mesh.dim)
     edge = mesh.cell_to_edge[cells]
     phi = level_set.phi[mesh.cells[cells]]
     on_vertex = phi == 0
-    on_edge = exists[edge]
+    on_edge = has_position[edge]
     n_vertices = mesh.dim + 1
     flags = np.concatenate([on_edge, on_vertex], axis=1)
     order = np.argsort(~flags, axis=1, kind="stable")[:, : mesh.dim]
@@ -62,23 +62,23 @@ def _cut_points(
         bary[row[~vertex], k, i] = b / (b - a)
         bary[row[~vertex], k, j] = a / (a - b)
         number[row[~vertex], k] = edge[row[~vertex], e]
-    inside = level_set.inside[mesh.cells[cells]]
-    psi = np.einsum("cvb,cb->cv", bary, inside)
+    psi_at_vertices = level_set.inside[mesh.cells[cells]]
+    psi = np.einsum("cvb,cb->cv", bary, psi_at_vertices)
     return CutEnds(bary, psi, number)
 
 
 def tip_parts(
-    mesh: Mesh, level_set: LevelSet, positions: Floats, exists: Bools
+    mesh: Mesh, level_set: LevelSet, positions: Floats, has_position: Bools
 ) -> list[tuple[SubParts, LipParts, Ints]]:
     """Sub-cells, lips and entry edges of the cells at each tip; see `_tip_cells`."""
     return [
-        _tip_cells(mesh, level_set, k, cells, positions, exists)
+        _tip_cells(mesh, level_set, k, cells, positions, has_position)
         for k, cells in enumerate(level_set.tip_cells)
     ]
 
 
 def _tip_cells(
-    mesh: Mesh, level_set: LevelSet, k: int, cells: Ints, positions: Floats, exists: Bools
+    mesh: Mesh, level_set: LevelSet, k: int, cells: Ints, positions: Floats, has_position: Bools
 ) -> tuple[SubParts, LipParts, Ints]:
     """Fans of sub-cells from tip k, the crack face piece that ends there, and its entry edges."""
     tip = level_set.tip[k]
@@ -87,11 +87,11 @@ def _tip_cells(
     apex = np.where(apex > ON_MESH, apex, 0.0)
     apex /= apex.sum(axis=1, keepdims=True)
     phi = level_set.phi[mesh.cells[cells]]
-    crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)
+    is_crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)
     owner, bary, side = [], [], []
     lip_cells, lip_bary, entries = [], [], []
-    ends = _cut_points(mesh, level_set, cells[crossed], positions, exists)
-    row_of, corners = np.cumsum(crossed) - 1, np.eye(mesh.dim + 1)
+    ends = _cut_points(mesh, level_set, cells[is_crossed], positions, has_position)
+    row_of, corners = np.cumsum(is_crossed) - 1, np.eye(mesh.dim + 1)
     for i, cell in enumerate(cells):
         loop: list[Floats] = []
         for v in range(mesh.dim + 1):
@@ -107,7 +107,7 @@ def _tip_cells(
             bary.append([apex[i], p, q])
             largest = phi[i, np.argmax(np.abs(phi[i]))]
             side.append(1 if (middle if middle != 0 else largest) >= 0 else -1)
-        if crossed[i]:
+        if is_crossed[i]:
             e = row_of[i]
             psi = level_set.psi[k][mesh.cells[cell]] @ ends.bary[e].T
             first = int(np.argmin(psi))
@@ -137,17 +137,17 @@ def lips_up_to_tips(
     for k, tip in enumerate(level_set.tip):
         psi_of_facets = level_set.psi[k][mesh.facets[facets]]
         length = np.linalg.norm(x[:, 1] - x[:, 0], axis=1)
-        ahead, behind_ = psi_of_facets.argmax(axis=1), psi_of_facets.argmin(axis=1)
+        front_corner, back_corner = psi_of_facets.argmax(axis=1), psi_of_facets.argmin(axis=1)
         row = np.arange(len(facets))
-        reaches = (psi_of_facets[row, ahead] > -1e-9 * length) & (
-            psi_of_facets[row, behind_] < -1e-9 * length
+        is_at_tip = (psi_of_facets[row, front_corner] > -1e-9 * length) & (
+            psi_of_facets[row, back_corner] < -1e-9 * length
         )
-        reaches &= np.isin(cells, level_set.tip_cells[k]).any(axis=1)
-        begin = x[row, behind_]
+        is_at_tip &= np.isin(cells, level_set.tip_cells[k]).any(axis=1)
+        begin = x[row, back_corner]
         x = np.where(
-            reaches[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
+            is_at_tip[:, None, None], np.stack([begin, np.broadcast_to(tip, begin.shape)], 1), x
         )
-        ends_at_tip |= reaches
+        ends_at_tip |= is_at_tip
     candidate_facets = np.nonzero(ends_at_tip | (psi.mean(axis=1) < 0))[0]
     return x[candidate_facets], candidate_facets
 
@@ -159,7 +159,7 @@ _NOTHING = 1e-30  # sub-cells below this share of their cell are left out
 
 
 def front_parts(
-    mesh: Mesh, level_set: LevelSet, positions: Floats, exists: Bools
+    mesh: Mesh, level_set: LevelSet, positions: Floats, has_position: Bools
 ) -> list[tuple[tuple[Ints, Floats, Floats, Ints], tuple[Ints, Floats], Ints]]:
     """Sub-cells, lips and entry edges of the cells at all fronts together; see `_front_subs`."""
     is_tip = np.zeros(len(mesh.cells), dtype=bool)
@@ -192,22 +192,22 @@ def _front_subs(
     entry : (e,) array of int
     """
     phi = level_set.phi[mesh.cells[cells]]
-    crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)
-    uncrossed, split = np.nonzero(~crossed)[0], np.nonzero(crossed)[0]
+    is_crossed = (phi.min(axis=1) < 0) & (phi.max(axis=1) > 0)
+    whole_cells, split = np.nonzero(~is_crossed)[0], np.nonzero(is_crossed)[0]
     corners = corner_places(mesh, level_set, cells)
     bary, share, side, parent = cut_simplices(phi[split], corners[split])
     largest = np.take_along_axis(phi, np.abs(phi).argmax(axis=1)[:, None], 1)[:, 0]
-    owner = np.concatenate([uncrossed, split[parent]])
-    bary = np.concatenate([np.broadcast_to(np.eye(4), (len(uncrossed), 4, 4)), bary])
-    share = np.concatenate([np.ones(len(uncrossed)), share])
-    side = np.concatenate([np.where(largest[uncrossed] >= 0, 1, -1), side])
+    owner = np.concatenate([whole_cells, split[parent]])
+    bary = np.concatenate([np.broadcast_to(np.eye(4), (len(whole_cells), 4, 4)), bary])
+    share = np.concatenate([np.ones(len(whole_cells)), share])
+    side = np.concatenate([np.where(largest[whole_cells] >= 0, 1, -1), side])
     for psi in level_set.psi:
         values = psi[mesh.cells[cells]]
         owner, bary, share, side = _cut_again(values, corners, owner, bary, share, side)
     lip, row = interface_simplices(phi[split], corners[split])
     lip_owner = split[row]
-    inside = np.einsum("svb,sb->sv", lip, level_set.inside[mesh.cells[cells[lip_owner]]])
-    part, row = parts_behind(inside, np.einsum("svb,sbd->svd", lip, corners[lip_owner]))
+    psi_at_lips = np.einsum("svb,sb->sv", lip, level_set.inside[mesh.cells[cells[lip_owner]]])
+    part, row = parts_behind(psi_at_lips, np.einsum("svb,sbd->svd", lip, corners[lip_owner]))
     lips = np.einsum("svw,swb->svb", part, lip[row])
     edges = np.unique(mesh.cell_to_edge[cells])
     t = positions[edges]
@@ -225,15 +225,15 @@ def _cut_again(
     """Cut sub-cells along psi, given as the places at the corners of their cells `(k, 4)`."""
     values = _snapped_values(np.einsum("svb,sb->sv", bary, psi[owner]), psi[owner])
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
-    uncut, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    whole_cells, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     x = np.einsum("svb,sbd->svd", bary[rows], corners[owner[rows]])
     inner, part, _, parent = cut_simplices(values[rows], x)
     source = rows[parent]
-    finer = np.einsum("svw,swb->svb", inner, bary[source])
-    every = np.concatenate([uncut, source])
-    result = np.concatenate([share[uncut], share[source] * part])
+    bary_of_parts = np.einsum("svw,swb->svb", inner, bary[source])
+    every = np.concatenate([whole_cells, source])
+    result = np.concatenate([share[whole_cells], share[source] * part])
     keep = result > _NOTHING
-    vertices = np.concatenate([bary[uncut], finer])
+    vertices = np.concatenate([bary[whole_cells], bary_of_parts])
     return owner[every][keep], vertices[keep], result[keep], side[every][keep]
 
 
@@ -256,19 +256,19 @@ def parts_behind(psi: Floats, x: Floats | None = None) -> tuple[Floats, Ints]:
     """
     values = _snapped_values(psi, psi)
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
-    uncut = np.nonzero(~cut & (values.min(axis=1) < 0))[0]
+    whole_cells = np.nonzero(~cut & (values.min(axis=1) < 0))[0]
     rows = np.nonzero(cut)[0]
     inner, _, side, parent = cut_simplices(values[rows], None if x is None else x[rows])
     is_behind = side < 0
-    corner = np.broadcast_to(np.eye(3), (len(uncut), 3, 3))
+    corner = np.broadcast_to(np.eye(3), (len(whole_cells), 3, 3))
     return np.concatenate([corner, inner[is_behind]]), np.concatenate(
-        [uncut, rows[parent[is_behind]]]
+        [whole_cells, rows[parent[is_behind]]]
     )
 
 
 def _snapped_values(values: Floats, scale: Floats) -> Floats:
-    small = _AT * np.abs(scale).max(axis=1, keepdims=True)
-    return np.where(np.abs(values) < small, 0.0, values)
+    tolerance = _AT * np.abs(scale).max(axis=1, keepdims=True)
+    return np.where(np.abs(values) < tolerance, 0.0, values)
 
 
 _Subs = tuple[Ints, Floats, Floats, Ints]  # cell, barycentric vertices, share, side
@@ -336,8 +336,8 @@ class Cut:
         if len(self.kinks.cells):
             row = np.full(len(mesh.cells), -1)
             row[self.kinks.cells] = np.arange(len(self.kinks.cells))
-            bent = np.nonzero(row[cell] >= 0)[0]
-            result[bent] = self.kinks.level(row[cell[bent]], bary[bent])
+            rows_at_kinks = np.nonzero(row[cell] >= 0)[0]
+            result[rows_at_kinks] = self.kinks.level(row[cell[rows_at_kinks]], bary[rows_at_kinks])
         return np.asarray(result)
 
     @property
@@ -364,18 +364,18 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
     values = phi[mesh.cells]
     columns = np.ascontiguousarray(values.T)  # minima of few values are quick along the first axis
     low = columns.min(axis=0)
-    crossed = (low < 0) & (columns.max(axis=0) > 0)
-    positions, exists = _edge_positions(mesh, phi)
+    is_crossed = (low < 0) & (columns.max(axis=0) > 0)
+    positions, has_position = _edge_positions(mesh, phi)
     is_tip = np.zeros(len(mesh.cells), dtype=bool)
     for cells in level_set.tip_cells:
         is_tip[cells] = True
-    candidates = np.nonzero(crossed & ~is_tip)[0]
+    candidates = np.nonzero(is_crossed & ~is_tip)[0]
     lip, owner = interface_simplices(values[candidates], corner_places(mesh, level_set, candidates))
     psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
-    sign_change = exists[mesh.cell_to_edge[candidates]]
+    sign_change = has_position[mesh.cell_to_edge[candidates]]
     is_close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
-    through = is_close & (np.bincount(owner, psi, len(candidates)) < 0)
-    cells = candidates[through]
+    is_through = is_close & (np.bincount(owner, psi, len(candidates)) < 0)
+    cells = candidates[is_through]
 
     edge_flag = np.zeros(len(mesh.edges), dtype=bool)
     edge_flag[mesh.cell_to_edge[cells]] = True
@@ -390,9 +390,9 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         corners = corner_places(mesh, level_set, cells)
         bary, fraction, side, parent = cut_simplices(values[cells], corners)
         subs = [(cells[parent], bary, fraction, side)]
-        lips = [_inner_lips(candidates[owner[through[owner]]], lip[through[owner]])]
+        lips = [_inner_lips(candidates[owner[is_through[owner]]], lip[is_through[owner]])]
     for end_subs, end_lips, entry in _GEOMETRY[mesh.dim].end_parts(
-        mesh, level_set, positions, exists
+        mesh, level_set, positions, has_position
     ):
         subs.append(end_subs)
         lips.append(_inner_lips(*end_lips))
@@ -410,8 +410,8 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         lip_cell=lock(lip_cell),
         lip_bary=lock(lip_bary),
         lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary)),
-        cut_edge=lock(np.where(edge_flag & exists, positions, np.nan)),
-        side=lock(np.where(crossed, 0, np.where(low >= 0, 1, -1))),
+        cut_edge=lock(np.where(edge_flag & has_position, positions, np.nan)),
+        side=lock(np.where(is_crossed, 0, np.where(low >= 0, 1, -1))),
         kinks=kinks,
     )
 
@@ -421,14 +421,19 @@ def _kinked_parts(kinks: Kinks, values: Floats, cells: Ints) -> tuple[list[_Subs
     values = np.array(values)
     values[kinks.cells] = kinks.values
     rows, split = kinks.split()
-    bent = kinks.cells[rows]
+    kinked_cells = kinks.cells[rows]
     bary, fraction, side, parent = cut_simplices(values[cells])
-    straight = ~np.isin(cells[parent], bent)
-    straight_parts = (cells[parent][straight], bary[straight], fraction[straight], side[straight])
+    is_straight = ~np.isin(cells[parent], kinked_cells)
+    straight_parts = (
+        cells[parent][is_straight],
+        bary[is_straight],
+        fraction[is_straight],
+        side[is_straight],
+    )
     lip, owner = interface_simplices(values[cells])
-    straight = ~np.isin(cells[owner], bent)
-    parts = [(cells[owner][straight], lip[straight])]
-    parts += [(bent, kinks.faces(rows)[:, k]) for k in (0, 1)]
+    is_straight = ~np.isin(cells[owner], kinked_cells)
+    parts = [(cells[owner][is_straight], lip[is_straight])]
+    parts += [(kinked_cells, kinks.faces(rows)[:, k]) for k in (0, 1)]
     owner, lip = (np.concatenate(part) for part in zip(*parts, strict=True))
     length = np.abs(lip[:, 1] - lip[:, 0]).max(axis=1)
     keep = length > 1e-13
@@ -447,29 +452,29 @@ def _cell_sides(values: Floats) -> Ints:
 
 def _edge_positions(mesh: Mesh, phi: Floats) -> tuple[Floats, Bools]:
     a, b = phi[mesh.edges].T
-    exists = a * b < 0
+    has_position = a * b < 0
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(exists, a / (a - b), np.nan), exists
+        return np.where(has_position, a / (a - b), np.nan), has_position
 
 
 def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
     """Crack faces that lie on facets of the mesh, each assembled once from its two cells."""
     d = mesh.dim
     on_crack = level_set.phi == 0
-    empty = _Lips(np.zeros((0, 2), np.int64), np.zeros((0, 2, d, d + 1)))
+    no_lips = _Lips(np.zeros((0, 2), np.int64), np.zeros((0, 2, d, d + 1)))
     if on_crack.sum() < d:
-        return empty
+        return no_lips
     zero = on_crack[mesh.facets].all(axis=1)
     facets = np.nonzero(zero & (mesh.facet_to_cell[:, 1] >= 0))[0]
     if not len(facets):
-        return empty
+        return no_lips
     cells = mesh.facet_to_cell[facets]
     side = _cell_sides(level_set.phi[mesh.cells[cells.ravel()]]).reshape(-1, 2)
     psi = level_set.inside[mesh.facets[facets]]
     keep = (psi.min(axis=1) < 0) & (side[:, 0] != side[:, 1])
     facets, cells, side, psi = facets[keep], cells[keep], side[keep], psi[keep]
     if not len(facets):
-        return empty
+        return no_lips
     cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
     x, row = _GEOMETRY[d].lips_up_to_ends(mesh, level_set, facets, cells, psi)
     cells = cells[row]
@@ -496,8 +501,8 @@ def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
 
 
 def _across_segments(corners: Floats) -> Floats:
-    along = corners[:, 1] - corners[:, 0]
-    return np.stack([-along[:, 1], along[:, 0]], axis=1)
+    segment = corners[:, 1] - corners[:, 0]
+    return np.stack([-segment[:, 1], segment[:, 0]], axis=1)
 
 
 def _across_triangles(corners: Floats) -> Floats:

@@ -98,12 +98,12 @@ def reach_of_tips(dim: int, order: int, size: float, cell: float, radius: float 
         What is given.
     """
     if dim == 2:
-        least, most, free = _LEAST, _MOST[order], _SHARE[order] * size
+        least_cells, most_cells, share_of_size = _LEAST, _MOST[order], _SHARE[order] * size
     else:
-        (least, most), free = _RANGE[order], _SHARE_OF_FRONT * size
+        (least_cells, most_cells), share_of_size = _RANGE[order], _SHARE_OF_FRONT * size
     if radius is not None:
         return max(radius, _LEAST * cell)
-    return max(min(free, most * cell), least * cell)
+    return max(min(share_of_size, most_cells * cell), least_cells * cell)
 
 
 def front_radii(
@@ -132,7 +132,7 @@ def front_radii(
         Fronts meet no junctions.
     """
     del meeting
-    least, most = _RANGE[order]
+    least_cells, most_cells = _RANGE[order]
     every = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
     if not any(every):
         return [() for _ in cracks]
@@ -144,8 +144,8 @@ def front_radii(
             size = surface_size(crack, mesh, body)
         for k, numbers in enumerate(fronts):
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
-            closed = bool(numbers[0] == numbers[-1])
-            room = _ASIDE * _to_sides(body, every[c][k], closed)
+            is_closed = bool(numbers[0] == numbers[-1])
+            room = _ASIDE * _to_sides(body, every[c][k], is_closed)
             others = [
                 x
                 for d, fronts_of_crack in enumerate(every)
@@ -156,27 +156,29 @@ def front_radii(
                 nearest = cKDTree(np.concatenate(others)).query(every[c][k])[0]
                 room = min(room, _APART * float(nearest.min()))
             if radius is None:
-                free = min(_SHARE_OF_FRONT * (2 if closed else 1) * size, room)
-                row.append(max(min(free, most * cell), least * cell))
+                share_of_size = min(_SHARE_OF_FRONT * (2 if is_closed else 1) * size, room)
+                row.append(max(min(share_of_size, most_cells * cell), least_cells * cell))
             else:
                 row.append(max(min(radius, room), _LEAST_OF_FRONT * cell))
         radii.append(tuple(row))
     return radii
 
 
-def _to_sides(body: Body, x: Floats, closed: bool) -> float:
+def _to_sides(body: Body, x: Floats, is_closed: bool) -> float:
     """Distance of a front to the boundary, but where it runs into it."""
-    inside = np.nonzero(body.contains(x))[0]
-    if not len(inside):
+    inner_points = np.nonzero(body.contains(x))[0]
+    if not len(inner_points):
         return np.inf
-    rows: Ints = inside[np.unique(np.linspace(0, len(inside) - 1, _SAMPLES).astype(int))]
+    rows: Ints = inner_points[
+        np.unique(np.linspace(0, len(inner_points) - 1, _SAMPLES).astype(int))
+    ]
     distance = np.abs(body.depth(x[rows])[0])
-    if closed:
+    if is_closed:
         return float(distance.min())
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
-    exits = np.minimum(s[rows] - s[inside[0]], s[inside[-1]] - s[rows])
-    along = exits > _EXIT * distance
-    return float(distance[along].min(initial=np.inf))
+    exits = np.minimum(s[rows] - s[inner_points[0]], s[inner_points[-1]] - s[rows])
+    is_along_front = exits > _EXIT * distance
+    return float(distance[is_along_front].min(initial=np.inf))
 
 
 # Cells: within this distance of a tip all cells carry its functions whole. By dimension and order:
@@ -226,8 +228,8 @@ def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
     on_facets = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
     if on_facets.any():
         one, other = mesh.cells[np.unique(cut.lip_cell[on_facets], axis=0)].transpose(1, 0, 2)
-        shared = (one[:, :, None] == other[:, None, :]).any(axis=2)
-        facets = one[shared].reshape(-1, mesh.dim)
+        is_shared = (one[:, :, None] == other[:, None, :]).any(axis=2)
+        facets = one[is_shared].reshape(-1, mesh.dim)
         flag[facet_nodes(mesh, order, facets)] = True
     for cells in cut.level_set.tip_cells:
         flag[nodes[cells]] = False
@@ -283,9 +285,9 @@ def divided_points(mesh: Mesh, crack: Crack, cut: Cut, flags: list[Bools]) -> li
             gap = float(np.linalg.norm(one - other[::-1], axis=1).min())
             if gap < _RUNS_ON * leg_size(mesh, cut.level_set.tip_cells[j]):
                 both = result[i] & result[j]
-                nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])
-                result[i] = result[i] & ~(both & ~nearer)
-                result[j] = result[j] & ~(both & nearer)
+                is_nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])
+                result[i] = result[i] & ~(both & ~is_nearer)
+                result[j] = result[j] & ~(both & is_nearer)
     return result
 
 

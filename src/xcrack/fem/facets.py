@@ -89,12 +89,12 @@ def _on_triangles(
     r, size = radius_at(space, nodes, bary), _longest_side(x)
     share = np.ones(len(x))
     for _ in range(halvings):
-        near = r.min(axis=1) < size
-        parts = np.einsum("cvw,swb->scvb", quarters(), corner[near]).reshape(-1, 3, 3)
-        of = np.concatenate([of[~near], np.repeat(of[near], 4)])
-        corner = np.concatenate([corner[~near], parts])
-        share = np.concatenate([share[~near], np.repeat(share[near] / 4, 4)])
-        size = np.concatenate([size[~near], np.repeat(size[near] / 2, 4)])
+        is_near = r.min(axis=1) < size
+        parts = np.einsum("cvw,swb->scvb", quarters(), corner[is_near]).reshape(-1, 3, 3)
+        of = np.concatenate([of[~is_near], np.repeat(of[is_near], 4)])
+        corner = np.concatenate([corner[~is_near], parts])
+        share = np.concatenate([share[~is_near], np.repeat(share[is_near] / 4, 4)])
+        size = np.concatenate([size[~is_near], np.repeat(size[is_near] / 2, 4)])
         r = radius_at(space, nodes[of], corner @ bary[of])
     number, place, rule = triangle_points(r, size)
     place = np.einsum("qv,qvb->qb", place, corner[number])
@@ -126,8 +126,8 @@ def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
     side = np.zeros((k, len(space.cuts)), dtype=np.int64)
     facet = space.mesh.facet_numbers(ends)
     for c, cut in enumerate(space.cuts):
-        touched, at_front = _touched_facets(space, c)
-        levels = [(cut.level_set.phi, touched)]
+        touched_facets, at_front = _touched_facets(space, c)
+        levels = [(cut.level_set.phi, touched_facets)]
         levels += [(psi, at_front) for psi in cut.level_set.psi]
         for values, where in levels:
             chosen = where[facet[number]]
@@ -135,7 +135,7 @@ def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
             number, bary, side = _split_parts(number, bary, side, x, values[ends], chosen)
         at = np.einsum("svb,sb->sv", bary, cut.level_set.phi[ends[number]])
         largest = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
-        changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched[facet[number]]
+        changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched_facets[facet[number]]
         side[:, c] = np.where(changes, 0, np.sign(largest))
     return FacetParts(number, bary, side)
 
@@ -160,14 +160,14 @@ def _split_parts(
 ) -> tuple[Ints, Floats, Ints]:
     """Split those of the chosen parts x on which a function of the facet changes its sign."""
     at = np.einsum("svb,sb->sv", bary, values[number])
-    small = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
-    at = np.where(np.abs(at) < small, 0.0, at)
+    tolerance = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
+    at = np.where(np.abs(at) < tolerance, 0.0, at)
     cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
-    uncut, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
+    whole_parts, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     inner, _, _, parent = cut_simplices(at[rows], x[rows])
-    source = np.concatenate([uncut, rows[parent]])
-    finer = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
-    return number[source], np.concatenate([bary[uncut], finer]), side[source]
+    source = np.concatenate([whole_parts, rows[parent]])
+    bary_of_parts = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
+    return number[source], np.concatenate([bary[whole_parts], bary_of_parts]), side[source]
 
 
 # Integration points on the faces of a crack, shared by contact, loads and K.
@@ -256,12 +256,12 @@ _POSITION = {2: _along_line, 3: _without_order}
 
 def arc_position(polyline: Floats, x: Floats) -> Floats:
     """Position of points along a polyline, from its first point `(k,)`, length."""
-    a, along = polyline[:-1], np.diff(polyline, axis=0)
-    length = np.linalg.norm(along, axis=1)
+    a, segment = polyline[:-1], np.diff(polyline, axis=0)
+    length = np.linalg.norm(segment, axis=1)
     start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
-    t = np.einsum("ksd,sd->ks", x[:, None] - a, along) / length**2
+    t = np.einsum("ksd,sd->ks", x[:, None] - a, segment) / length**2
     t = np.clip(t, 0.0, 1.0)
-    foot = a + t[..., None] * along
+    foot = a + t[..., None] * segment
     best = np.argmin(np.linalg.norm(x[:, None] - foot, axis=2), axis=1)
     row = np.arange(len(x))
     return start[best] + t[row, best] * length[best]
@@ -275,12 +275,12 @@ def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Int
     list of (functions (k, n), numbers of the points (k,), values (k, n))
         For each lip and batch; the jump at a point is the sum over all entries of the point.
     """
-    result, inside = [], lips.inside_cells
+    result, inner_cells = [], lips.inside_cells
     batches: list[tuple[Batch, Ints, Ints]] = []
     for s, sign in ((0, -1), (1, 1)):
         cell = lips.cell[:, s]
         side = lip_side(space, c, cell, lips.bary[:, s], sign)
-        batches = batches if inside and s else space.batches_of_points(cell)
+        batches = batches if inner_cells and s else space.batches_of_points(cell)
         for batch, number, row in batches:
             N, _ = space.tabulate(batch, row, lips.bary[number, s], side[number], slopes=False)
             result.append((batch.functions[row], number, sign * N))
@@ -288,20 +288,20 @@ def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Int
 
 
 def jump_matrix(
-    space: FunctionSpace, c: int, lips: LipPoints, along: Floats | None = None
+    space: FunctionSpace, c: int, lips: LipPoints, tangents: Floats | None = None
 ) -> sp.csr_matrix:
-    """Jump n . [[u]] at the lip points `(q, n_dof)`; with directions `along` (q, d), theirs."""
-    direction = lips.normal if along is None else along
+    """Jump n . [[u]] at the lip points `(q, n_dof)`; with directions `tangents` (q, d), theirs."""
+    direction = lips.normal if tangents is None else tangents
     parts, rows, columns, values = jump_values(space, c, lips), [], [], []
     if lips.inside_cells:  # both lips have the same functions
         half = len(parts) // 2
         pairs = zip(parts[:half], parts[half:], strict=True)
         parts = [(functions, number, N + other) for (functions, number, N), (*_, other) in pairs]
     for functions, number, N in parts:
-        acts = (functions >= 0) & (N != 0)
-        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
-        columns.append(functions[acts])
-        values.append(N[acts])
+        is_active = (functions >= 0) & (N != 0)
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[is_active])
+        columns.append(functions[is_active])
+        values.append(N[is_active])
     place = np.concatenate(rows) * np.int64(space.n_functions) + np.concatenate(columns)
     jump = np.concatenate(values)
     if lips.inside_cells:
@@ -310,13 +310,13 @@ def jump_matrix(
     else:
         place, number = np.unique(place, return_inverse=True)
         jump = np.bincount(number, jump, len(place))
-    differs = jump != 0  # standard functions take one value on both lips of a cell
-    point, function = np.divmod(place[differs], space.n_functions)
+    is_jump = jump != 0  # standard functions take one value on both lips of a cell
+    point, function = np.divmod(place[is_jump], space.n_functions)
     d = space.dim
-    entries = (jump[differs, None] * direction[point]).ravel()
-    unknown = (function[:, None] * d + np.arange(d)).ravel().astype(np.int32)
+    entries = (jump[is_jump, None] * direction[point]).ravel()
+    unknowns = (function[:, None] * d + np.arange(d)).ravel().astype(np.int32)
     start = offsets(np.bincount(point, minlength=len(lips)) * d).astype(np.int32)
-    return sp.csr_matrix((entries, unknown, start), shape=(len(lips), space.n_dof))
+    return sp.csr_matrix((entries, unknowns, start), shape=(len(lips), space.n_dof))
 
 
 __all__ = []

@@ -147,8 +147,8 @@ class FunctionSpace:
         sides = [np.where(phi >= 0, 1, -1).astype(np.int64) for phi in levels]
         for joint in self.joints:
             distance = np.linalg.norm(self.node_points - joint.centre, axis=1)
-            beyond = (distance < _BESIDE * joint.reach) & (sides[joint.on] != joint.side)
-            sides[joint.crack][beyond] = 0
+            is_beyond = (distance < _BESIDE * joint.reach) & (sides[joint.on] != joint.side)
+            sides[joint.crack][is_beyond] = 0
         return tuple(lock(side) for side in sides)
 
     @cached_property
@@ -158,13 +158,13 @@ class FunctionSpace:
         for c, cut in enumerate(self.cuts):
             cells = _with_any(self.heaviside[c] >= 0, self.cell_nodes)
             nodes = self.cell_nodes[cells]
-            carries = self.heaviside[c][nodes] >= 0
-            differs = self.node_side[c][nodes] == -cut.side[cells, None]
-            acts = (carries & (differs | cut.is_cut[cells, None])).any(axis=1)
+            has_jump = self.heaviside[c][nodes] >= 0
+            is_on_other_side = self.node_side[c][nodes] == -cut.side[cells, None]
+            is_active = (has_jump & (is_on_other_side | cut.is_cut[cells, None])).any(axis=1)
             for joint in self.joints:
                 if joint.crack == c:
-                    acts |= joint.near[cells]
-            mask[cells] |= acts.astype(np.int64) << c
+                    is_active |= joint.near[cells]
+            mask[cells] |= is_active.astype(np.int64) << c
         for t, tip in enumerate(self.tips):
             cells = _with_any(tip.point_to_function >= 0, self.mesh.cells)
             mask[cells] |= 1 << (len(self.cuts) + t)
@@ -208,21 +208,21 @@ class FunctionSpace:
         list of (batch, numbers of its points, row in the batch of the cell of each)
         """
         if len(cell) and (cell[1:] >= cell[:-1]).all():  # as integration points are
-            begins = np.concatenate([[True], cell[1:] != cell[:-1]])
-            cells, inverse = cell[begins], np.cumsum(begins) - 1
+            is_begin = np.concatenate([[True], cell[1:] != cell[:-1]])
+            cells, inverse = cell[is_begin], np.cumsum(is_begin) - 1
         else:
             cells, inverse = np.unique(cell, return_inverse=True)
         groups = self.batches(cells)
         if len(groups) == 1:
             return [(groups[0][0], np.arange(len(cell)), inverse)]
-        served = []
+        parts = []
         for batch, rows in groups:
             place = np.full(len(cells), -1, dtype=np.int64)
             place[rows] = np.arange(len(rows))
             positions = place[inverse]
             number = (positions >= 0).nonzero()[0]
-            served.append((batch, number, positions[number]))
-        return served
+            parts.append((batch, number, positions[number]))
+        return parts
 
     def _batch(self, cells: Ints, cracks: tuple[int, ...], tips: tuple[int, ...]) -> Batch:
         nodes = self.cell_nodes[cells]
@@ -316,11 +316,11 @@ class FunctionSpace:
         )
         for joint in self.joints:
             if joint.crack == tip.crack and self.dim == 3:
-                beyond = side[:, joint.on] == -joint.side
+                is_beyond = side[:, joint.on] == -joint.side
                 last = first + (self.dim + 1) * tip.functions
                 for table in tables:
                     if len(table):
-                        table[beyond, first:last] = 0.0
+                        table[is_beyond, first:last] = 0.0
 
     @cached_property
     def tip_shift(self) -> tuple[Floats, ...]:

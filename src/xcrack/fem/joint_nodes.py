@@ -38,15 +38,15 @@ def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
         cells = np.nonzero(inner[space.cell_nodes].any(axis=1))[0]
         subs = sub_cells(space, cells)
         # Ahead of a tip the level set changes its sign too, but cuts nothing.
-        crossed = ending_cut.is_cut[subs.cell] | on.is_cut[subs.cell]
+        is_crossed = ending_cut.is_cut[subs.cell] | on.is_cut[subs.cell]
         if space.dim == 3:  # along the junction its own front may be near
-            inside = ending_cut.level_set.inside[space.mesh.cells]
-            ahead = np.asarray((inside >= 0).any(axis=1))
-            crossed &= ending_cut.is_cut[subs.cell] | ~ahead[subs.cell]
-        added = _parted_nodes(space, subs, joint.crack, crossed) & is_beside
-        added &= inner & ~_nodes_of(space, ending_cut.is_tip)
-        parted = _parted_nodes(space, subs, joint.crack, np.ones(len(crossed), dtype=bool))
-        result[joint.crack] = added | (result[joint.crack] & (parted | ~inner))
+            psi_at_vertices = ending_cut.level_set.inside[space.mesh.cells]
+            is_ahead = np.asarray((psi_at_vertices >= 0).any(axis=1))
+            is_crossed &= ending_cut.is_cut[subs.cell] | ~is_ahead[subs.cell]
+        is_added = _parted_nodes(space, subs, joint.crack, is_crossed) & is_beside
+        is_added &= inner & ~_nodes_of(space, ending_cut.is_tip)
+        is_parted = _parted_nodes(space, subs, joint.crack, np.ones(len(is_crossed), dtype=bool))
+        result[joint.crack] = is_added | (result[joint.crack] & (is_parted | ~inner))
     return tuple(result)
 
 

@@ -71,27 +71,27 @@ def joined_cuts(
     """
     result, joints = list(cuts), []
     for junction in junctions:
-        through, ending, joint = _joined_pair(
+        through_cut, ending, joint = _joined_pair(
             mesh, result[junction.on], result[junction.crack], junction
         )
-        result[junction.on], result[junction.crack] = through, ending
+        result[junction.on], result[junction.crack] = through_cut, ending
         joints.append(joint)
     return tuple(result), tuple(joints)
 
 
 def _joined_pair(
-    mesh: Mesh, through: Cut, ending: Cut, junction: Junction
+    mesh: Mesh, through_cut: Cut, ending: Cut, junction: Junction
 ) -> tuple[Cut, Cut, Joint]:
     """Cuts of the crack that runs through and of the one that ends on it."""
     centre = mesh.points[mesh.cells].mean(axis=1)
-    junction = replace(junction, reach=_joint_radius(mesh, through, ending, junction))
+    junction = replace(junction, reach=_joint_radius(mesh, through_cut, ending, junction))
     is_near = np.linalg.norm(centre - junction.x, axis=1) < junction.reach
-    split = _split_cut(mesh, through, ending, junction, is_near)
+    split = _split_cut(mesh, through_cut, ending, junction, is_near)
     lips = split.lip_points(mesh)
     values = np.abs(_at(mesh, ending.level_set.phi, split.lip_cell[:, 1], split.lip_bary[:, 1]))
     distance = np.linalg.norm(lips - junction.x, axis=2) + values
     x = lips.reshape(-1, 2)[int(np.argmin(distance))]
-    clipped, both = _clipped_cut(mesh, through, ending, junction, is_near)
+    clipped_cut, both = _clipped_cut(mesh, through_cut, ending, junction, is_near)
     joint = Joint(
         junction.crack,
         junction.on,
@@ -102,24 +102,24 @@ def _joined_pair(
         lock(is_near),
         lock(both),
     )
-    return split, clipped, joint
+    return split, clipped_cut, joint
 
 
-def _joint_radius(mesh: Mesh, through: Cut, ending: Cut, junction: Junction) -> float:
+def _joint_radius(mesh: Mesh, through_cut: Cut, ending: Cut, junction: Junction) -> float:
     """Radius that holds all points whose cells both cracks cut, and no tip.
 
     Cells that both cracks cut lie farther from a shallow junction than their mean size tells.
     """
     h = float(mesh.cell_size[cells_around(mesh, junction.x, 1e-9)].mean())
     flags = np.zeros((2, mesh.n_points), dtype=bool)
-    for flag, cut in zip(flags, (through, ending), strict=True):
+    for flag, cut in zip(flags, (through_cut, ending), strict=True):
         flag[mesh.cells[cut.cells]] = True
     distance = np.linalg.norm(mesh.points[flags.all(axis=0)] - junction.x, axis=1)
-    common = float(distance[distance < 2 * junction.reach].max(initial=0.0))
-    tips = [*through.level_set.tip, *ending.level_set.tip]
+    overlap = float(distance[distance < 2 * junction.reach].max(initial=0.0))
+    tips = [*through_cut.level_set.tip, *ending.level_set.tip]
     tip = min((float(np.linalg.norm(x - junction.x)) for x in tips), default=np.inf)
-    radius = min(max(junction.reach, common + _ROOM * h), tip - _FROM_TIP * h)
-    return max(radius, min(max(common + _LEAST * h, REACH * h), junction.reach))
+    radius = min(max(junction.reach, overlap + _ROOM * h), tip - _FROM_TIP * h)
+    return max(radius, min(max(overlap + _LEAST * h, REACH * h), junction.reach))
 
 
 def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
@@ -140,15 +140,15 @@ def _crossing_shares(
 
     `share` is right elsewhere; of `begin`, the level set at the first ends, the sign counts.
     """
-    bent = np.nonzero(np.isin(cell, cut.kinks.cells))[0]
+    at_kinks = np.nonzero(np.isin(cell, cut.kinks.cells))[0]
     result = np.array(share)
-    low, high = np.zeros(len(bent)), np.ones(len(bent))
-    for _ in range(_HALVES if len(bent) else 0):
+    low, high = np.zeros(len(at_kinks)), np.ones(len(at_kinks))
+    for _ in range(_HALVES if len(at_kinks) else 0):
         middle = (low + high) / 2
-        at = _points_between(bary[bent][:, None], middle)
-        before = begin[bent] * _level(mesh, cut, cell[bent], at)[:, 0] > 0
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    result[bent] = (low + high) / 2
+        at = _points_between(bary[at_kinks][:, None], middle)
+        is_before = begin[at_kinks] * _level(mesh, cut, cell[at_kinks], at)[:, 0] > 0
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    result[at_kinks] = (low + high) / 2
     return result
 
 
@@ -159,30 +159,30 @@ def _points_between(bary: Floats, share: Floats) -> Floats:
 
 
 def _clipped_cut(
-    mesh: Mesh, through: Cut, ending: Cut, junction: Junction, is_near: Bools
+    mesh: Mesh, through_cut: Cut, ending: Cut, junction: Junction, is_near: Bools
 ) -> tuple[Cut, Bools]:
     """The cut of the crack that ends, without what lies beyond the other, and the cells of both."""
-    phi, side = through.level_set.phi, junction.side
+    phi, side = through_cut.level_set.phi, junction.side
     cell = ending.lip_cell[:, 0]
-    value = _level(mesh, through, cell, ending.lip_bary[:, 0]) * side
+    value = _level(mesh, through_cut, cell, ending.lip_bary[:, 0]) * side
     value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
     keep = ~is_near[cell] | (value > 0).any(axis=1)
     shorten = is_near[cell] & keep & (value < 0).any(axis=1)
     bary = np.array(ending.lip_bary)
     rows = np.nonzero(shorten)[0]
     a, b = value[rows].T
-    share = _crossing_shares(mesh, through, cell[rows], bary[rows, 0], a / (a - b), a * side)
+    share = _crossing_shares(mesh, through_cut, cell[rows], bary[rows, 0], a / (a - b), a * side)
     bary[rows, :, (b < 0).astype(np.int64)] = _points_between(bary[rows], share)
     is_discarded = np.zeros(len(mesh.cells), dtype=bool)
     is_discarded[cell[~keep & (cell == ending.lip_cell[:, 1])]] = True
     cells = ending.cells[~is_discarded[ending.cells]]
     both = np.zeros(len(mesh.cells), dtype=bool)
-    both[cells] = through.is_cut[cells] & is_near[cells]
+    both[cells] = through_cut.is_cut[cells] & is_near[cells]
     subs = ~(is_discarded | both)[ending.sub_to_cell]
     one, two = mesh.edges.T
     t = ending.cut_edge
     # At a kink the other crack cuts an edge elsewhere than where phi is zero.
-    other = through.cut_edge
+    other = through_cut.cut_edge
     with np.errstate(invalid="ignore"):
         at_cut = np.where(t < other, phi[one], phi[two])
     at_cut = np.where(np.isnan(other), (1 - t) * phi[one] + t * phi[two], at_cut) * side
@@ -191,7 +191,7 @@ def _clipped_cut(
     )
     with np.errstate(invalid="ignore"):
         cut_edge = np.where(is_close & (at_cut < 0), np.nan, t)
-    sides = np.where(is_near & (through.side == -side), 0, ending.side)
+    sides = np.where(is_near & (through_cut.side == -side), 0, ending.side)
     return replace(
         ending,
         cells=lock(cells),
@@ -207,23 +207,25 @@ def _clipped_cut(
     ), both
 
 
-def _split_cut(mesh: Mesh, through: Cut, ending: Cut, junction: Junction, is_near: Bools) -> Cut:
+def _split_cut(
+    mesh: Mesh, through_cut: Cut, ending: Cut, junction: Junction, is_near: Bools
+) -> Cut:
     """The cut of the crack that runs through, its faces split where the other one meets them."""
-    cell = through.lip_cell[:, (junction.side + 1) // 2]
-    bary = through.lip_bary[np.arange(len(cell)), (junction.side + 1) // 2]
+    cell = through_cut.lip_cell[:, (junction.side + 1) // 2]
+    bary = through_cut.lip_bary[np.arange(len(cell)), (junction.side + 1) // 2]
     value = _at(mesh, ending.level_set.phi, cell, bary)
     value[np.abs(value) < 1e-13 * mesh.cell_size[cell, None]] = 0.0
     rows = np.nonzero(
         is_near[cell] & ending.is_cut[cell] & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
     )[0]
     a, b = value[rows].T
-    middle = _points_between(through.lip_bary[rows], a / (a - b))
-    first, second = np.array(through.lip_bary), np.array(through.lip_bary[rows])
+    middle = _points_between(through_cut.lip_bary[rows], a / (a - b))
+    first, second = np.array(through_cut.lip_bary), np.array(through_cut.lip_bary[rows])
     first[rows, :, 1] = middle
     second[:, :, 0] = middle
     return replace(
-        through,
-        lip_cell=lock(np.concatenate([through.lip_cell, through.lip_cell[rows]])),
+        through_cut,
+        lip_cell=lock(np.concatenate([through_cut.lip_cell, through_cut.lip_cell[rows]])),
         lip_bary=lock(np.concatenate([first, second])),
-        lip_normal=lock(np.concatenate([through.lip_normal, through.lip_normal[rows]])),
+        lip_normal=lock(np.concatenate([through_cut.lip_normal, through_cut.lip_normal[rows]])),
     )

@@ -46,15 +46,17 @@ def joined_cuts(
     """
     result, joints = list(cuts), []
     for junction in junctions:
-        through, ending = result[junction.on], result[junction.crack]
-        gone = cuts[junction.on].side == -junction.side
-        gone |= _all_beyond(mesh, through, ending, junction.side)
-        acts = (ending.is_cut | ending.is_tip | _beside_faces(mesh, ending)) & ~gone
-        both = acts & through.is_cut
-        met = both | (acts & _beside_faces(mesh, through))
-        _check(mesh, through, ending, junction, acts, met)
-        result[junction.on] = _split_cut(mesh, through, ending, met)
-        result[junction.crack] = _clipped_cut(mesh, through, ending, junction.side, gone, both)
+        through_cut, ending = result[junction.on], result[junction.crack]
+        is_gone = cuts[junction.on].side == -junction.side
+        is_gone |= _all_beyond(mesh, through_cut, ending, junction.side)
+        is_active = (ending.is_cut | ending.is_tip | _beside_faces(mesh, ending)) & ~is_gone
+        both = is_active & through_cut.is_cut
+        is_joined = both | (is_active & _beside_faces(mesh, through_cut))
+        _check(mesh, through_cut, ending, junction, is_active, is_joined)
+        result[junction.on] = _split_cut(mesh, through_cut, ending, is_joined)
+        result[junction.crack] = _clipped_cut(
+            mesh, through_cut, ending, junction.side, is_gone, both
+        )
         every = np.ones(len(mesh.cells), dtype=bool)
         joints.append(
             Joint(
@@ -66,20 +68,25 @@ def joined_cuts(
 
 
 def _check(
-    mesh: Mesh, through: Cut, ending: Cut, junction: Junction, acts: Bools, met: Bools
+    mesh: Mesh,
+    through_cut: Cut,
+    ending: Cut,
+    junction: Junction,
+    is_active: Bools,
+    is_joined: Bools,
 ) -> None:
     """Raise where two cracks do not meet on a line between the fronts of the other one."""
     c, on = junction.crack, junction.on
-    if not met.any():
-        if (_on_faces(mesh, ending) & _on_faces(mesh, through)).any():
+    if not is_joined.any():
+        if (_on_faces(mesh, ending) & _on_faces(mesh, through_cut)).any():
             return  # both lie on facets of the mesh, and meet on edges of it
         raise GeometryError(
             f"crack {c} does not reach crack {on}, on which it is to end: draw it on to that "
             "crack or through it, or take the other side of it."
         )
-    past = acts & (through.side == 0) & ~through.is_cut
-    if past.any():
-        cell = int(np.nonzero(past)[0][0])
+    is_past = is_active & (through_cut.side == 0) & ~through_cut.is_cut
+    if is_past.any():
+        cell = int(np.nonzero(is_past)[0][0])
         raise CoarseMeshError(
             f"crack {c} ends on crack {on}, but runs past its front, or to within a cell of it, at "
             f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}: let crack {on} reach two cells or "
@@ -87,8 +94,8 @@ def _check(
             f"{on} end on it, an arm for each side on which it lies. Where each runs past the "
             "front of the other neither helps: end one of them a few cells before."
         )
-    cells = np.nonzero(met)[0]
-    one, other = (_slopes(mesh, cut, cells) for cut in (through, ending))
+    cells = np.nonzero(is_joined)[0]
+    one, other = (_slopes(mesh, cut, cells) for cut in (through_cut, ending))
     sine = np.linalg.norm(np.cross(one, other), axis=1)
     if sine.min() < _SINE:
         cell = int(cells[int(np.argmin(sine))])
@@ -102,18 +109,18 @@ def _check(
 
 def _beside_faces(mesh: Mesh, cut: Cut) -> Bools:
     """Cells beside facets of the mesh on which a crack lies `(m,)`."""
-    beside = np.zeros(len(mesh.cells), dtype=bool)
-    beside[cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]] = True
-    return beside
+    is_beside = np.zeros(len(mesh.cells), dtype=bool)
+    is_beside[cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]] = True
+    return is_beside
 
 
 def _on_faces(mesh: Mesh, cut: Cut) -> Bools:
     """Points of facets of the mesh on which a crack lies `(n,)`."""
     pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
     corner, other = mesh.cells[pairs].transpose(1, 0, 2)
-    shared = (corner[:, :, None] == other[:, None]).any(axis=2)
+    is_shared = (corner[:, :, None] == other[:, None]).any(axis=2)
     on_faces = np.zeros(mesh.n_points, dtype=bool)
-    on_faces[corner[shared]] = True
+    on_faces[corner[is_shared]] = True
     return on_faces
 
 
@@ -124,13 +131,13 @@ def _slopes(mesh: Mesh, cut: Cut, cells: Ints) -> Floats:
     return np.asarray(slope / np.maximum(length, 1e-300))
 
 
-def _all_beyond(mesh: Mesh, through: Cut, ending: Cut, side: int) -> Bools:
+def _all_beyond(mesh: Mesh, through_cut: Cut, ending: Cut, side: int) -> Bools:
     """Cells of both cracks in which all faces of the arm lie beyond the other one `(m,)`."""
     cell = ending.lip_cell[:, 0]
-    value = _at(mesh, through.level_set.phi, cell, ending.lip_bary[:, 0]) * side
+    value = _at(mesh, through_cut.level_set.phi, cell, ending.lip_bary[:, 0]) * side
     has_faces = np.zeros(len(mesh.cells), dtype=bool)
     has_faces[cell[(value > 0).any(axis=1)]] = True
-    return through.is_cut & (ending.is_cut | ending.is_tip) & ~has_faces
+    return through_cut.is_cut & (ending.is_cut | ending.is_tip) & ~has_faces
 
 
 def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
@@ -146,20 +153,22 @@ def _parts(value: Floats, bary: Floats, x: Floats) -> tuple[Floats, Ints, Ints]:
     return np.einsum("svw,stwb->stvb", inner, bary[parent]), side, parent
 
 
-def _clipped_cut(mesh: Mesh, through: Cut, ending: Cut, side: int, gone: Bools, both: Bools) -> Cut:
+def _clipped_cut(
+    mesh: Mesh, through_cut: Cut, ending: Cut, side: int, is_gone: Bools, both: Bools
+) -> Cut:
     """The cut of the arm, without what lies beyond the other crack."""
-    phi = through.level_set.phi
+    phi = through_cut.level_set.phi
     cell = ending.lip_cell[:, 0]
     value = _at(mesh, phi, cell, ending.lip_bary[:, 0]) * side
     low, high = value.min(axis=1), value.max(axis=1)
     clips = both[cell]
-    keep = ~gone[cell] & (~clips | ((low >= 0) & (high > 0)))
+    keep = ~is_gone[cell] & (~clips | ((low >= 0) & (high > 0)))
     rows = np.nonzero(clips & (low < 0) & (high > 0))[0]
     x = ending.lip_points(mesh)[rows]
     bary, part_side, parent = _parts(value[rows], ending.lip_bary[rows], x)
-    before = part_side > 0
-    source = np.concatenate([np.nonzero(keep)[0], rows[parent[before]]])
-    subs = ~(gone | both)[ending.sub_to_cell]
+    is_before = part_side > 0
+    source = np.concatenate([np.nonzero(keep)[0], rows[parent[is_before]]])
+    subs = ~(is_gone | both)[ending.sub_to_cell]
     one, two = mesh.edges.T
     t = ending.cut_edge
     at_cut = ((1 - t) * phi[one] + t * phi[two]) * side
@@ -167,32 +176,38 @@ def _clipped_cut(mesh: Mesh, through: Cut, ending: Cut, side: int, gone: Bools, 
         cut_edge = np.where(at_cut < 0, np.nan, t)
     return replace(
         ending,
-        cells=lock(ending.cells[~gone[ending.cells]]),
+        cells=lock(ending.cells[~is_gone[ending.cells]]),
         sub_to_cell=lock(ending.sub_to_cell[subs]),
         sub_bary=lock(ending.sub_bary[subs]),
         sub_fraction=lock(ending.sub_fraction[subs]),
         sub_side=lock(ending.sub_side[subs]),
         lip_cell=lock(ending.lip_cell[source]),
-        lip_bary=lock(np.concatenate([ending.lip_bary[keep], bary[before]])),
+        lip_bary=lock(np.concatenate([ending.lip_bary[keep], bary[is_before]])),
         lip_normal=lock(ending.lip_normal[source]),
         cut_edge=lock(cut_edge),
-        side=lock(np.where(through.side == -side, 0, ending.side)),
+        side=lock(np.where(through_cut.side == -side, 0, ending.side)),
     )
 
 
-def _split_cut(mesh: Mesh, through: Cut, ending: Cut, met: Bools) -> Cut:
+def _split_cut(mesh: Mesh, through_cut: Cut, ending: Cut, is_joined: Bools) -> Cut:
     """The cut of the crack that runs through, its faces split where the arm meets them."""
-    cell = through.lip_cell[:, 0]
-    value = _at(mesh, ending.level_set.phi, cell, through.lip_bary[:, 0])
-    split = met[through.lip_cell].any(axis=1) & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+    cell = through_cut.lip_cell[:, 0]
+    value = _at(mesh, ending.level_set.phi, cell, through_cut.lip_bary[:, 0])
+    split = (
+        is_joined[through_cut.lip_cell].any(axis=1)
+        & (value.min(axis=1) < 0)
+        & (value.max(axis=1) > 0)
+    )
     rows = np.nonzero(split)[0]
-    bary, _, parent = _parts(value[rows], through.lip_bary[rows], through.lip_points(mesh)[rows])
+    bary, _, parent = _parts(
+        value[rows], through_cut.lip_bary[rows], through_cut.lip_points(mesh)[rows]
+    )
     source = np.concatenate([np.nonzero(~split)[0], rows[parent]])
     return replace(
-        through,
-        lip_cell=lock(through.lip_cell[source]),
-        lip_bary=lock(np.concatenate([through.lip_bary[~split], bary])),
-        lip_normal=lock(through.lip_normal[source]),
+        through_cut,
+        lip_cell=lock(through_cut.lip_cell[source]),
+        lip_bary=lock(np.concatenate([through_cut.lip_bary[~split], bary])),
+        lip_normal=lock(through_cut.lip_normal[source]),
     )
 
 

@@ -124,22 +124,22 @@ def sharpened_cut(
         return replace(NO_KINKS, points=lock(line[on_points].reshape(-1, 2))), positions
     edges = np.unique(mesh.cell_to_edge[cells_near])
     edges = edges[~np.isnan(positions[edges])]
-    moved = _crossings(mesh, level_set, edges, positions)
-    changed = ~np.isnan(positions) & (moved != positions)
-    where, points = _vertices(mesh, level_set, cells_near, moved, numbers, on_points)
-    redone = changed[mesh.cell_to_edge[cells]].any(axis=1) | np.isin(cells, list(where))
-    rows = np.sort(cells[redone])
-    values = _values(mesh, level_set.phi, rows, moved)
+    new_positions = _crossings(mesh, level_set, edges, positions)
+    is_changed = ~np.isnan(positions) & (new_positions != positions)
+    where, points = _vertices(mesh, level_set, cells_near, new_positions, numbers, on_points)
+    is_cut_anew = is_changed[mesh.cell_to_edge[cells]].any(axis=1) | np.isin(cells, list(where))
+    rows = np.sort(cells[is_cut_anew])
+    values = _values(mesh, level_set.phi, rows, new_positions)
     vertex = np.full((len(rows), 3), np.nan)
     for cell, at in where.items():
         vertex[np.searchsorted(rows, cell)] = at
-    return Kinks(lock(points), lock(rows), lock(values), lock(vertex)), moved
+    return Kinks(lock(points), lock(rows), lock(values), lock(vertex)), new_positions
 
 
 def _is_point(mesh: Mesh, cells: Ints, x: Floats) -> bool:
     """Whether a kink in some cells is a point of the mesh: pieces along edges cut no cell there."""
-    away = np.linalg.norm(mesh.points[mesh.cells[cells]] - x, axis=2)
-    return bool((away <= _AT * mesh.cell_size[cells, None]).any())
+    distance = np.linalg.norm(mesh.points[mesh.cells[cells]] - x, axis=2)
+    return bool((distance <= _AT * mesh.cell_size[cells, None]).any())
 
 
 def _crossings(mesh: Mesh, level_set: LevelSet, edges: Ints, positions: Floats) -> Floats:
@@ -220,17 +220,17 @@ def _values(mesh: Mesh, phi: Floats, cells: Ints, positions: Floats) -> Floats:
     values, row = np.array(phi[mesh.cells[cells]]), np.arange(len(cells))
     side = np.sign(values)
     # The corner alone on its side keeps its value; of two beside one on the crack, the first.
-    alone = np.where((side == 0).any(axis=1), 0.0, side.sum(axis=1))[:, None]
-    lone = np.argmax(np.where(alone == 0, side != 0, side * alone < 0), axis=1)
+    lone_side = np.where((side == 0).any(axis=1), 0.0, side.sum(axis=1))[:, None]
+    lone_corner = np.argmax(np.where(lone_side == 0, side != 0, side * lone_side < 0), axis=1)
     for k in (1, 2):
-        other = (lone + k) % 3
-        edge = mesh.cell_to_edge[cells, lone + other - 1]  # edges 01, 02, 12
+        other = (lone_corner + k) % 3
+        edge = mesh.cell_to_edge[cells, lone_corner + other - 1]  # edges 01, 02, 12
         t = positions[edge]
-        t = np.where(mesh.edges[edge, 0] == mesh.cells[cells, lone], t, 1 - t)
-        crossed = side[row, lone] * side[row, other] < 0
+        t = np.where(mesh.edges[edge, 0] == mesh.cells[cells, lone_corner], t, 1 - t)
+        is_crossed = side[row, lone_corner] * side[row, other] < 0
         with np.errstate(invalid="ignore"):
-            new = -values[row, lone] * (1 - t) / t
-        values[row, other] = np.where(crossed, new, values[row, other])
+            new_value = -values[row, lone_corner] * (1 - t) / t
+        values[row, other] = np.where(is_crossed, new_value, values[row, other])
     return values
 
 
@@ -261,11 +261,11 @@ def _two_lines(values: Floats, vertex: Floats) -> tuple[Floats, float]:
     first, last = _crossing_ends(values)
     lines = np.stack([np.cross(first, vertex), np.cross(vertex, last)])
     lines /= np.abs(lines).max(axis=1, keepdims=True)
-    left = 1.0 if np.linalg.det([first, vertex, last]) > 0 else -1.0
+    sense = 1.0 if np.linalg.det([first, vertex, last]) > 0 else -1.0
     corner = int(np.argmax(np.abs(values)))
-    level = left * (left * lines[:, corner]).min()
+    level = sense * (sense * lines[:, corner]).min()
     sign = 1.0 if level * values[corner] > 0 else -1.0
-    return sign * np.abs(values).max() * lines, sign * left
+    return sign * np.abs(values).max() * lines, sign * sense
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

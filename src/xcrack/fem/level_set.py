@@ -81,10 +81,10 @@ def near_edges(mesh: Mesh, phi: Floats, shift: Floats | None = None) -> Bools:
         What phi has more than a distance, which changes by no more than the length of an edge.
     """
     ends = np.abs(phi)[mesh.edges]
-    most = mesh.edge_length * (1 + 1e-6)
+    limit = mesh.edge_length * (1 + 1e-6)
     if shift is not None:
-        most = most + np.abs(np.diff(shift[mesh.edges], axis=1)[:, 0])
-    return np.asarray(ends[:, 0] + ends[:, 1] <= most)
+        limit = limit + np.abs(np.diff(shift[mesh.edges], axis=1)[:, 0])
+    return np.asarray(ends[:, 0] + ends[:, 1] <= limit)
 
 
 def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
@@ -93,10 +93,10 @@ def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
     phi[np.abs(phi) < 1e-15 * mesh.longest_edge] = 0.0
     while True:
         a, b = phi[mesh.edges].T
-        crossed = a * b < 0
+        is_crossed = a * b < 0
         with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(crossed, a / (a - b), 0.5)
-        low, high = crossed & (share < SNAP), crossed & (share > 1 - SNAP)
+            share = np.where(is_crossed, a / (a - b), 0.5)
+        low, high = is_crossed & (share < SNAP), is_crossed & (share > 1 - SNAP)
         if not (low.any() or high.any()):
             return phi
         phi[mesh.edges[low, 0]] = 0.0
@@ -119,20 +119,20 @@ def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
     n_segments = len(vertices) - 1
     for k, tip in enumerate(crack.tips or ()):
         from_tip = mesh.points - x[k]
-        straight = from_tip @ frame[k, 0]
+        psi_on_ray = from_tip @ frame[k, 0]
         r = np.linalg.norm(from_tip, axis=1)
-        behind = -np.sqrt(np.maximum((r - np.abs(phi)) * (r + np.abs(phi)), 0.0))
+        psi_behind = -np.sqrt(np.maximum((r - np.abs(phi)) * (r + np.abs(phi)), 0.0))
         ray, neighbour = (0, 1) if tip == 0 else (n_segments - 1, n_segments - 2)
         # Points nearest to the kink behind the last piece are as near to one piece as to the
         # other: round-off must not decide.
         last = np.linalg.norm(vertices[neighbour + 1] - vertices[neighbour])
-        along = (segment == ray) | ((segment == neighbour) & (straight > -last))
-        psi[k] = np.where(along, straight, behind)
+        is_on_ray = (segment == ray) | ((segment == neighbour) & (psi_on_ray > -last))
+        psi[k] = np.where(is_on_ray, psi_on_ray, psi_behind)
     mouth = np.full(mesh.n_points, -reach)
     for end, ray in ((0, 0), (len(crack.points) - 1, n_segments - 1)):
         if end not in (crack.tips or ()):
-            beyond = segment == ray
-            mouth[beyond] = np.linalg.norm(mesh.points[beyond] - crack.points[end], axis=1)
+            is_beyond = segment == ray
+            mouth[is_beyond] = np.linalg.norm(mesh.points[is_beyond] - crack.points[end], axis=1)
     levels = tied_to_tips(mesh, crack, phi, psi, mouth, near_edges(mesh, phi))
     return replace(levels, line=crack.points)
 
@@ -166,24 +166,26 @@ def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
     pieces contradict each other.
     """
     first, last = points[0], points[-1]
-    back, on = _unit(first - points[1]), _unit(last - points[-2])
-    first_reach = _free_reach(first, back, points[1:], reach)
+    backward_direction, on = _unit(first - points[1]), _unit(last - points[-2])
+    first_reach = _free_reach(first, backward_direction, points[1:], reach)
     last_reach = _free_reach(last, on, points[:-1], reach)
-    ahead = np.stack([last, last + last_reach * on])
-    first_reach = _free_reach(first, back, ahead, first_reach)
-    last_reach = _free_reach(last, on, np.stack([first, first + first_reach * back]), last_reach)
-    return first + first_reach * back, last + last_reach * on
+    segment_ahead = np.stack([last, last + last_reach * on])
+    first_reach = _free_reach(first, backward_direction, segment_ahead, first_reach)
+    last_reach = _free_reach(
+        last, on, np.stack([first, first + first_reach * backward_direction]), last_reach
+    )
+    return first + first_reach * backward_direction, last + last_reach * on
 
 
 def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: float) -> float:
     """Length up to which a ray runs before it meets a polyline."""
     if len(polyline) < 2:
         return reach
-    a, along = polyline[:-1], np.diff(polyline, axis=0)
+    a, segment = polyline[:-1], np.diff(polyline, axis=0)
     gap = a - origin
-    cross = direction[0] * along[:, 1] - direction[1] * along[:, 0]
+    cross = direction[0] * segment[:, 1] - direction[1] * segment[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = (gap[:, 0] * along[:, 1] - gap[:, 1] * along[:, 0]) / cross
+        t = (gap[:, 0] * segment[:, 1] - gap[:, 1] * segment[:, 0]) / cross
         u = (gap[:, 0] * direction[1] - gap[:, 1] * direction[0]) / cross
     hit = (t > 0) & (u >= -1e-9) & (u <= 1 + 1e-9)
     # Of pieces on the line of the ray t and u are quotients of round-off, also of those behind it.
@@ -257,17 +259,21 @@ def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
         layers = int(np.clip(np.ceil(width / edge), 1, 64))
         origin = crack.points[base]
         rays = width * direction
-        new, faces = ruled_strip(n_points, base, origin, rays, layers, front.closed, crossed=True)
-        points.append(new)
-        everything = np.concatenate(points)
-        reference = np.zeros((n_points + len(new), 3))
+        strip_points, faces = ruled_strip(
+            n_points, base, origin, rays, layers, front.closed, is_crossed=True
+        )
+        points.append(strip_points)
+        all_points = np.concatenate(points)
+        reference = np.zeros((n_points + len(strip_points), 3))
         reference[base] = n
         reference[n_points : n_points + len(n) * layers] = np.repeat(n, layers, axis=0)
-        expected = reference[faces].sum(axis=1)
-        upright = np.einsum("ij,ij->i", face_normals(everything, faces), unit(expected)) > 0.2
-        triangles.append(faces[upright])
-        label.append(np.full(int(upright.sum()), f + 1))
-        n_points += len(new)
+        expected_normal = reference[faces].sum(axis=1)
+        is_upright = (
+            np.einsum("ij,ij->i", face_normals(all_points, faces), unit(expected_normal)) > 0.2
+        )
+        triangles.append(faces[is_upright])
+        label.append(np.full(int(is_upright.sum()), f + 1))
+        n_points += len(strip_points)
     return ExtendedSurface(
         lock(np.concatenate(points)), lock(np.concatenate(triangles)), lock(np.concatenate(label))
     )
@@ -276,28 +282,33 @@ def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
 def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Ints, Floats, Floats]:
     """Point numbers, directions and normals of the rays of a strip, with fans at sharp places."""
     m = len(front.x)
-    following = np.roll(front.number, -1)
+    next_number = np.roll(front.number, -1)
     n_sides = m if front.closed else m - 1
-    along = np.roll(front.x, -1, axis=0) - front.x
+    edge = np.roll(front.x, -1, axis=0) - front.x
     # The faces run against the direction of the front.
     normal = [
-        side_normal.get((int(following[j]), int(front.number[j])), front.frame[j, 1])
+        side_normal.get((int(next_number[j]), int(front.number[j])), front.frame[j, 1])
         for j in range(n_sides)
     ]
-    out = unit(np.cross(normal, along[:n_sides]))
-    previous = np.roll(out, 1, axis=0)
-    angles = np.arccos(np.clip(np.einsum("ij,ij->i", previous, out), -1, 1))
+    outward_direction = unit(np.cross(normal, edge[:n_sides]))
+    previous_direction = np.roll(outward_direction, 1, axis=0)
+    angles = np.arccos(np.clip(np.einsum("ij,ij->i", previous_direction, outward_direction), -1, 1))
     base, direction, normals = [], [], []
     for j in range(m):
         t, n, b = front.frame[j]
         rays = [t]
         if front.closed or 0 < j < m - 1:
-            before, after, angle = previous[j], out[j], float(angles[j])
-            if angle > _FAN and (after - before) @ b > 0:
+            previous_ray, next_ray, angle = (
+                previous_direction[j],
+                outward_direction[j],
+                float(angles[j]),
+            )
+            if angle > _FAN and (next_ray - previous_ray) @ b > 0:
                 pieces = int(np.ceil(angle / _FAN))
                 share = np.arange(pieces + 1) / pieces
                 rays = [
-                    (np.sin((1 - c) * angle) * before + np.sin(c * angle) * after) / np.sin(angle)
+                    (np.sin((1 - c) * angle) * previous_ray + np.sin(c * angle) * next_ray)
+                    / np.sin(angle)
                     for c in share
                 ]
         base.extend([int(front.number[j])] * len(rays))
@@ -366,13 +377,15 @@ def with_far_sides(mesh: Mesh, crack: Crack, levels: "LevelSet", reach: float) -
     """
     size = _largest_cells(mesh, crack)
     band = reach + 2 * size
-    far = np.nonzero(np.abs(levels.phi) >= band * (1 - 1e-9))[0]
-    if not len(far):
+    far_points = np.nonzero(np.abs(levels.phi) >= band * (1 - 1e-9))[0]
+    if not len(far_points):
         return levels
     surface = extended_surface(crack, mesh, band + size)
-    distance = signed_in(triangle_tree(surface.points, surface.triangles), mesh.points[far])[0]
+    distance = signed_in(triangle_tree(surface.points, surface.triangles), mesh.points[far_points])[
+        0
+    ]
     phi = np.array(levels.phi)
-    phi[far] = np.copysign(phi[far], distance)
+    phi[far_points] = np.copysign(phi[far_points], distance)
     return replace(levels, phi=lock(phi))
 
 
@@ -385,7 +398,7 @@ def _largest_cells(mesh: Mesh, crack: Crack) -> float:
 def _front_distance(
     points: Floats,
     phi: Floats,
-    ahead: Bools,
+    is_ahead: Bools,
     front: Front,
     band: float,
     far_distance: float,
@@ -393,13 +406,13 @@ def _front_distance(
     """Distance to one front along the surface, positive ahead."""
     r, segment, position = front_distance(points, front.x, front.closed, band)
     has_segment = segment >= 0
-    psi = np.where(ahead, far_distance, -far_distance)
+    psi = np.where(is_ahead, far_distance, -far_distance)
     rows = np.nonzero(has_segment)[0]
     root = np.sqrt(np.maximum((r[rows] - np.abs(phi[rows])) * (r[rows] + np.abs(phi[rows])), 0.0))
-    psi[rows] = np.where(ahead[rows], root, -root)
-    flat = rows[root < _FLAT * r[rows]]
-    foot, direction = _foot(front, segment[flat], position[flat])
-    psi[flat] = np.einsum("qd,qd->q", points[flat] - foot, direction)
+    psi[rows] = np.where(is_ahead[rows], root, -root)
+    flat_rows = rows[root < _FLAT * r[rows]]
+    foot, direction = _foot(front, segment[flat_rows], position[flat_rows])
+    psi[flat_rows] = np.einsum("qd,qd->q", points[flat_rows] - foot, direction)
     return psi
 
 
@@ -416,16 +429,16 @@ def _shifted_psi(
     if not len(middle):
         return psi
     _, segment, position = front_distance(middle, front.x, front.closed)
-    foot, ahead = _foot(front, segment, position)
-    offset = np.einsum("qd,qd->q", middle - foot, ahead)
+    foot, direction = _foot(front, segment, position)
+    offset = np.einsum("qd,qd->q", middle - foot, direction)
     if np.abs(offset).max() < _STRAIGHT * mesh.cell_size[cells].mean():
         return psi
     rows = np.nonzero(np.abs(psi) < 2 * band)[0]
     distance, nearest = cKDTree(middle).query(mesh.points[rows], k=min(_CHORDS, len(middle)))
     distance, nearest = (a.reshape(len(rows), -1) for a in (distance, nearest))
     # Chords beside a bend must not move the straight part next to it.
-    beyond = (distance**2 - distance[:, :1] ** 2) / mesh.cell_size[cells].mean() ** 2
-    share = length[nearest] * np.exp(-np.minimum(beyond, 50.0))
+    excess = (distance**2 - distance[:, :1] ** 2) / mesh.cell_size[cells].mean() ** 2
+    share = length[nearest] * np.exp(-np.minimum(excess, 50.0))
     shifted = psi.copy()
     shifted[rows] += (share * offset[nearest]).sum(axis=1) / share.sum(axis=1)
     return shifted
@@ -455,22 +468,24 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
     bary, weight = simplex_rule(3, 2)
     x = np.einsum("pv,cvd->cpd", bary, mesh.points[mesh.cells[cells]]).reshape(-1, 3)
     distances = signed_in(tree, x)
-    distance, _, beyond = (a.reshape(len(cells), len(weight)) for a in distances)
+    distance, _, is_beyond = (a.reshape(len(cells), len(weight)) for a in distances)
     error = distance - values[cells] @ bary.T
     size = mesh.cell_size[cells]
-    of_crack = (np.abs(error).max(axis=1) < _NO_CUT * size) & ~beyond.any(axis=1)
+    of_crack = (np.abs(error).max(axis=1) < _NO_CUT * size) & ~is_beyond.any(axis=1)
     cells, error, size = cells[of_crack], error[of_crack], size[of_crack]
     shift = np.zeros(mesh.n_points)
     if np.abs(error).max(initial=0.0) < _STRAIGHT * size.min(initial=np.inf):
         return shift
     nodes, volume = mesh.cells[cells], mesh.volume[cells]
     load = np.einsum("c,p,pi,cp->ci", volume, weight, bary, error).ravel()
-    lumped = np.bincount(nodes.ravel(), np.repeat(volume / 4, 4), mesh.n_points)
-    lumped[lumped == 0] = 1.0
+    nodal_volume = np.bincount(nodes.ravel(), np.repeat(volume / 4, 4), mesh.n_points)
+    nodal_volume[nodal_volume == 0] = 1.0
     # Of the mass matrix over its lumped one all eigenvalues lie between a fifth and one.
     for _ in range(_PASSES):
         product = (volume / 20)[:, None] * (shift[nodes] + shift[nodes].sum(axis=1, keepdims=True))
-        shift += 1.25 * np.bincount(nodes.ravel(), load - product.ravel(), mesh.n_points) / lumped
+        shift += (
+            1.25 * np.bincount(nodes.ravel(), load - product.ravel(), mesh.n_points) / nodal_volume
+        )
     return shift
 
 
@@ -482,11 +497,11 @@ def _chords(mesh: Mesh, phi: Floats, psi: Floats, cells: Ints) -> tuple[Floats, 
         system = np.stack([phi[corner], psi[corner], np.ones(corner.shape)], axis=1)
         size = np.abs(system).max(axis=2, keepdims=True)
         system = system / np.maximum(size, 1e-300)
-        regular = np.abs(np.linalg.det(system)) > 1e-12
+        is_regular = np.abs(np.linalg.det(system)) > 1e-12
         bary = np.full(corner.shape, np.nan)
-        rhs = np.zeros((int(regular.sum()), 3, 1))
+        rhs = np.zeros((int(is_regular.sum()), 3, 1))
         rhs[:, 2] = 1.0
-        bary[regular] = np.linalg.solve(system[regular], rhs)[..., 0]
+        bary[is_regular] = np.linalg.solve(system[is_regular], rhs)[..., 0]
         hit = bary.min(axis=1) > -_AT
         x = np.einsum("kv,kvd->kd", bary, mesh.points[corner])
         ends.append(np.where(hit[:, None], x, np.nan))
@@ -503,8 +518,8 @@ def _foot(front: Front, segment: Ints, position: Floats) -> tuple[Floats, Floats
     t = position[:, None]
     second = (segment + 1) % len(front.x)
     foot = (1 - t) * front.x[segment] + t * front.x[second]
-    ahead = (1 - t) * front.frame[segment, 0] + t * front.frame[second, 0]
-    return foot, ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+    direction = (1 - t) * front.frame[segment, 0] + t * front.frame[second, 0]
+    return foot, direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints:
@@ -513,11 +528,11 @@ def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints
     rows = np.nonzero((values.min(axis=1) <= 0) & (values.max(axis=1) >= 0))[0]
     edge = mesh.cell_to_edge[rows]
     a, b = mesh.edges[edge, 0], mesh.edges[edge, 1]
-    crossed = phi[a] * phi[b] < 0
-    is_close = (near_edge[edge] | ~crossed).all(axis=1)
+    is_crossed = phi[a] * phi[b] < 0
+    is_close = (near_edge[edge] | ~is_crossed).all(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         t = phi[a] / (phi[a] - phi[b])
-        at_edge = np.where(crossed, (1 - t) * psi[a] + t * psi[b], np.nan)
+        at_edge = np.where(is_crossed, (1 - t) * psi[a] + t * psi[b], np.nan)
     corner = mesh.cells[rows]
     at_corner = np.where(phi[corner] == 0, psi[corner], np.nan)
     every = np.concatenate([at_edge, at_corner], axis=1)

@@ -42,18 +42,18 @@ def load_vectors(
     forces = [np.zeros((space.n_functions, space.dim)) for _ in loads]
     _add_tractions(forces, space, loads)
     for f, load in zip(forces, loads, strict=True):
-        acts = load.acts
-        if "point_force" in acts:
+        kinds = load.acts
+        if "point_force" in kinds:
             _add_point_forces(f, space, *load.point_forces(space.mesh))
-        if "volume" in acts:
+        if "volume" in kinds:
             points = body_points(space)
             _add(f, space, points, load.volume(position(space, points.cell, points.bary)))
-        if "initial_stress" in acts:
+        if "initial_stress" in kinds:
             points = body_points(space)
             x = position(space, points.cell, points.bary)
             sigma = elasticity.initial_stress(load, x, points.cell, points.bary)
             _subtract_stress(f, space, points, sigma)
-        if "face_pressure" in acts:
+        if "face_pressure" in kinds:
             for c, on_lip in enumerate(lips):
                 p = load.face_pressure(on_lip.x, c)
                 if p is not None:
@@ -156,16 +156,16 @@ def _add_point_forces(f: Floats, space: FunctionSpace, number: Ints, force: Floa
     side = cell_side(space, cell)
     for c, cut in enumerate(space.cuts):
         phi = cut.level_set.phi[mesh.edges[edge]].mean(axis=1)
-        crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
-        side[crossed, c] = np.where(phi[crossed] >= 0, 1, -1)
+        is_crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
+        side[is_crossed, c] = np.where(phi[is_crossed] >= 0, 1, -1)
     order = np.argsort(cell, kind="stable")
     points = Points(cell[order], 0.5 * is_end[order], np.ones(len(edge)), side[order])
     _add(f, space, points, total[order])
 
 
 def _scatter(f: Floats, functions: Ints, force: Floats) -> None:
-    active = functions >= 0
-    np.add.at(f, functions[active], force[active])
+    is_active = functions >= 0
+    np.add.at(f, functions[is_active], force[is_active])
 
 
 def body_points(space: FunctionSpace) -> Points:
@@ -200,13 +200,13 @@ def _points_on_facets(
     is_vertex = mesh.cells[c][:, :, None] == facets[owner][:, None, :]
     on_facet = np.einsum("qv,qvb->qb", place, parts.bary[k])
     bary = np.einsum("qvf,qf->qv", is_vertex.astype(float), on_facet)
-    opposite = (~is_vertex.any(axis=2)).argmax(axis=1)
-    inward = mesh.gradient[c, opposite]
-    normal = -inward / np.linalg.norm(inward, axis=1, keepdims=True)
+    opposite_corner = (~is_vertex.any(axis=2)).argmax(axis=1)
+    inward_normal = mesh.gradient[c, opposite_corner]
+    normal = -inward_normal / np.linalg.norm(inward_normal, axis=1, keepdims=True)
     side = cell_side(space, c)
     for i, cut in enumerate(space.cuts):
-        crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
-        side[crossed, i] = parts.side[k, i][crossed]
+        is_crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
+        side[is_crossed, i] = parts.side[k, i][is_crossed]
     side = at_joints(space, c, bary, side)
     order = np.argsort(c, kind="stable")
     points = Points(c[order], bary[order], weight[order], side[order])
@@ -251,13 +251,13 @@ def mesh_loads(space: FunctionSpace, loads: Iterable[MeshLoad]) -> dict[int, Flo
 
 
 def on_mesh(
-    space: FunctionSpace, loads: Iterable[tuple[Load, Floats]], before: Iterable[MeshLoad]
+    space: FunctionSpace, loads: Iterable[tuple[Load, Floats]], previous_loads: Iterable[MeshLoad]
 ) -> tuple[MeshLoad, ...]:
     """Those loads with their vectors `(n_dof,)` that act on facets of plain cells alone.
 
     What is known of them from an earlier solve in the mesh serves again.
     """
-    loads_before = {id(one.load): one for one in before}
+    loads_before = {id(one.load): one for one in previous_loads}
     result = []
     for load, f in loads:
         if load.acts != {"traction"}:
@@ -308,38 +308,40 @@ def known_unknowns(space: FunctionSpace, supports: Sequence[Support]) -> Imposed
     ProblemError
         Unknown sets, wrong shapes or nan, or two supports that contradict each other at a point.
     """
-    fixed = np.zeros((space.n_functions, space.dim), dtype=bool)
+    is_fixed = np.zeros((space.n_functions, space.dim), dtype=bool)
     value = np.zeros((space.n_functions, space.dim))
-    fitted = np.zeros_like(fixed)
-    owner = np.full(fixed.shape, -1, dtype=np.int64)
+    is_fitted = np.zeros_like(is_fixed)
+    owner = np.full(is_fixed.shape, -1, dtype=np.int64)
     for number, support in enumerate(supports):
         if support.holds:
             functions = _functions_of(space, support.where, support.kind)
             for axis in _axes(support.displacement_at(np.zeros((1, space.dim)))):
-                _impose(space, fixed, value, fitted, functions, axis, np.zeros(len(functions)), 0)
+                _impose(
+                    space, is_fixed, value, is_fitted, functions, axis, np.zeros(len(functions)), 0
+                )
         else:
             for axis, functions, numbers, n_fitted in _imposed_part(space, support):
-                _impose(space, fixed, value, fitted, functions, axis, numbers, n_fitted)
-        owner[fixed & (owner < 0)] = number
-    return ImposedValues(fixed.ravel(), value.ravel(), owner.ravel())
+                _impose(space, is_fixed, value, is_fitted, functions, axis, numbers, n_fitted)
+        owner[is_fixed & (owner < 0)] = number
+    return ImposedValues(is_fixed.ravel(), value.ravel(), owner.ravel())
 
 
 def _impose(
     space: FunctionSpace,
-    fixed: Bools,
+    is_fixed: Bools,
     value: Floats,
-    fitted: Bools,
+    is_fitted: Bools,
     functions: Ints,
     axis: int,
     numbers: Floats,
     n_fitted: int,
 ) -> None:
     """Write values; the last `n_fitted` come from a fit and may differ from a neighbour's."""
-    again = fixed[functions, axis]
+    is_fixed_again = is_fixed[functions, axis]
     from_fit = np.arange(len(functions)) >= len(functions) - n_fitted
     scale = max(float(np.abs(numbers).max(initial=0)), float(np.abs(value).max(initial=0)))
-    clash = again & (np.abs(value[functions, axis] - numbers) > 1e-6 * scale)
-    clash &= ~from_fit & ~fitted[functions, axis]
+    clash = is_fixed_again & (np.abs(value[functions, axis] - numbers) > 1e-6 * scale)
+    clash &= ~from_fit & ~is_fitted[functions, axis]
     if clash.any():
         i = int(np.argmax(clash))
         x = space.node_points[functions[i]]
@@ -347,9 +349,9 @@ def _impose(
             f"two supports contradict each other at {np.round(x, 6).tolist()}, axis {axis}: "
             f"{value[functions[i], axis]:.6g} and {numbers[i]:.6g}; leave one direction free."
         )
-    value[functions[~again], axis] = numbers[~again]
-    fixed[functions, axis] = True
-    fitted[functions[~again], axis] = from_fit[~again]
+    value[functions[~is_fixed_again], axis] = numbers[~is_fixed_again]
+    is_fixed[functions, axis] = True
+    is_fitted[functions[~is_fixed_again], axis] = from_fit[~is_fixed_again]
 
 
 def _set_nodes(space: FunctionSpace, where: object, what: str) -> Ints:
@@ -396,13 +398,13 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
     """
     for c, cut in enumerate(space.cuts):
         phi = cut.level_set.phi
-        touches = np.zeros((2, space.mesh.n_points), dtype=bool)
+        is_touched = np.zeros((2, space.mesh.n_points), dtype=bool)
         for corner in range(facets.shape[1]):
             others = np.delete(phi[facets], corner, axis=1)
-            touches[0, facets[(others < 0).any(axis=1), corner]] = True
-            touches[1, facets[(others > 0).any(axis=1), corner]] = True
+            is_touched[0, facets[(others < 0).any(axis=1), corner]] = True
+            is_touched[1, facets[(others > 0).any(axis=1), corner]] = True
         ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
-        is_cut_off = ends & touches[0] & ~touches[1]
+        is_cut_off = ends & is_touched[0] & ~is_touched[1]
         if is_cut_off.any():
             x = np.round(space.mesh.points[np.argmax(is_cut_off)], 6).tolist()
             raise ProblemError(
@@ -422,10 +424,10 @@ def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Flo
         number, row, _ = points.of_cells(batch.cells)
         N, _ = space.tabulate(batch, row, points.bary[number], points.side[number], slopes=False)
         functions = batch.functions[row]
-        acts = (functions >= 0) & (np.abs(N) > _TRACE)
-        columns.append(functions[acts])
-        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
-        values.append(N[acts])
+        is_active = (functions >= 0) & (np.abs(N) > _TRACE)
+        columns.append(functions[is_active])
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[is_active])
+        values.append(N[is_active])
     return points, np.concatenate(columns), np.concatenate(rows), np.concatenate(values)
 
 
@@ -437,14 +439,14 @@ def _imposed_part(space: FunctionSpace, support: Support) -> list[tuple[int, Int
         u = support.displacement_at(space.node_points[nodes])
         return [(axis, nodes, u[:, axis], 0) for axis in _axes(u)]
     _check_ends(space, where, facet_set(space.mesh, where, support.name), what)
-    fitted, coefficients = _fit(space, support)
-    plain = nodes[~np.isin(nodes, fitted[fitted < space.n_nodes])]
+    fitted_functions, coefficients = _fit(space, support)
+    other_nodes = nodes[~np.isin(nodes, fitted_functions[fitted_functions < space.n_nodes])]
     parts = [coefficients]
-    if len(plain):
-        parts.insert(0, support.displacement_at(space.node_points[plain]))
+    if len(other_nodes):
+        parts.insert(0, support.displacement_at(space.node_points[other_nodes]))
     values = np.concatenate(parts)
-    functions = np.concatenate([plain, fitted])
-    return [(axis, functions, values[:, axis], len(fitted)) for axis in _axes(values)]
+    functions = np.concatenate([other_nodes, fitted_functions])
+    return [(axis, functions, values[:, axis], len(fitted_functions)) for axis in _axes(values)]
 
 
 def _axes(values: Floats) -> list[int]:
@@ -459,7 +461,7 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     would leave the facet half free. At a node on a crack the value has two answers: the facets
     beside it tell which one is meant.
     """
-    empty = np.zeros(0, dtype=np.int64), np.zeros((0, space.dim))
+    no_values = np.zeros(0, dtype=np.int64), np.zeros((0, space.dim))
     facets = facet_set(space.mesh, support.where, support.name)
     owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
     on_lip = np.zeros(space.n_nodes, dtype=bool)
@@ -468,19 +470,19 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
         on_lip[vertices] |= (cut.level_set.phi == 0) & (number[vertices] >= 0)
     facets = facets[(space.signature[owner] != 0) | on_lip[facets].any(axis=1)]
     if not len(facets):
-        return empty
+        return no_values
     points, column, row, entry = _traces(space, facets)
-    special = (column >= space.n_nodes) | np.isin(column, np.nonzero(on_lip)[0])
-    if not special.any():
-        return empty
-    keep = np.isin(row, np.unique(row[special]))
+    is_special = (column >= space.n_nodes) | np.isin(column, np.nonzero(on_lip)[0])
+    if not is_special.any():
+        return no_values
+    keep = np.isin(row, np.unique(row[is_special]))
     unknowns, place = np.unique(column[keep], return_inverse=True)
     row_ids, row_place = np.unique(row[keep], return_inverse=True)
     A = np.zeros((len(row_ids), len(unknowns)))
     A[row_place, place] = entry[keep]
     x = position(space, points.cell, points.bary)[row_ids]
-    given = support.displacement_at(x)
-    target = np.nan_to_num(given)
+    imposed = support.displacement_at(x)
+    target = np.nan_to_num(imposed)
     # Each point counts alike: weighted by length, the data of a sliver would be cut off as noise.
     # Enriched functions take what standard ones leave, or they would take part in every field
     # where their traces are nearly those of polynomials.
@@ -489,8 +491,8 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
     scale = _scales(space)[unknowns]
     correction = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
-    free = np.isnan(given).any(axis=0)
-    return unknowns, np.where(free, np.nan, solution + correction / scale[:, None])
+    is_free = np.isnan(imposed).any(axis=0)
+    return unknowns, np.where(is_free, np.nan, solution + correction / scale[:, None])
 
 
 def _scales(space: FunctionSpace) -> Floats:

@@ -50,18 +50,18 @@ def tip_points(
     weight : (q,) array
         As a share of the cell's volume.
     """
-    regular, regular_bary, regular_share, fans = _towards_tips(space, cell, bary, share, fan)
+    regular_parts, regular_bary, regular_share, fans = _towards_tips(space, cell, bary, share, fan)
     # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
     # enough (K is the same to its error with half of the points, measured).
-    enough = max(2 * n - 3, 3)
-    rule, weight = simplex_rule(space.dim, enough)
-    if enough > SYMMETRIC:
-        regular_bary = _from_tips(space, cell[regular], regular_bary)
+    degree = max(2 * n - 3, 3)
+    rule, weight = simplex_rule(space.dim, degree)
+    if degree > SYMMETRIC:
+        regular_bary = _from_tips(space, cell[regular_parts], regular_bary)
     place = np.einsum("pv,svb->spb", rule, regular_bary).reshape(-1, space.dim + 1)
-    sub, swept, swept_share = _fan_points(space, cell, fans, n)
+    sub, bary_of_fans, swept_share = _fan_points(space, cell, fans, n)
     return (
-        np.concatenate([np.repeat(regular, len(weight)), sub]),
-        np.concatenate([place, swept]),
+        np.concatenate([np.repeat(regular_parts, len(weight)), sub]),
+        np.concatenate([place, bary_of_fans]),
         np.concatenate([np.outer(regular_share, weight).ravel(), swept_share]),
     )
 
@@ -123,9 +123,9 @@ def _fan_around(number: Ints, bary: Floats, share: Floats, x: Floats, tip: Float
     best = np.argmin(np.linalg.norm(foot - tip[:, None], axis=2), axis=1)
     row = np.arange(len(x))
     i, j = np.array(pairs)[best].T
-    along = x[row, j] - x[row, i]
+    edge = x[row, j] - x[row, i]
     t = np.clip(
-        ((foot[row, best] - x[row, i]) * along).sum(axis=1) / (along * along).sum(axis=1), 0, 1
+        ((foot[row, best] - x[row, i]) * edge).sum(axis=1) / (edge * edge).sum(axis=1), 0, 1
     )[:, None]
     apex = (1 - t) * bary[row, i] + t * bary[row, j]
     k = 3 - i - j
@@ -152,9 +152,9 @@ def _fan_points(
     number, bary, share = fans
     mesh = space.mesh
     x = np.einsum("svb,sbd->svd", bary, mesh.points[mesh.cells[cell[number]]])
-    left, right = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
-    a, b = np.linalg.norm(left, axis=1), np.linalg.norm(right, axis=1)
-    angle = np.abs(np.arctan2(_cross(left, right), (left * right).sum(axis=1)))
+    left_edge, right_edge = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    a, b = np.linalg.norm(left_edge, axis=1), np.linalg.norm(right_edge, axis=1)
+    angle = np.abs(np.arctan2(_cross(left_edge, right_edge), (left_edge * right_edge).sum(axis=1)))
     sectors = np.maximum(np.ceil(angle / _SECTOR), 1).astype(np.int64)
     row, k = ranges(sectors)
 
@@ -174,8 +174,8 @@ def _fan_points(
     u = (s * s)[None, :, None, None]
     points = (1 - u) * bary[row, 0][:, None, None] + u * far_points[:, None]
     # dV = 2 area u du dtau with u = s².
-    radial = 4 * s**3 * ws
-    weight = (share[row] * (end - begin))[:, None, None] * radial[None, :, None] * wt
+    radial_weight = 4 * s**3 * ws
+    weight = (share[row] * (end - begin))[:, None, None] * radial_weight[None, :, None] * wt
     each = len(s) * len(t)
     return np.repeat(number[row], each), points.reshape(-1, 3), weight.ravel()
 
@@ -262,18 +262,20 @@ def front_points(
     """
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
     r, size = radius_at(space, space.mesh.cells[cell], bary), _longest_edges(x)
-    touching, far = _on_front(bary, r, size)
-    tiny = share < (1 - _SAME) * _TINY
-    coarse = far & (tiny | (r.min(axis=1) > (1 + _SAME) * _FAR * size)) & (space.order == 1)
-    swept = _swept_points(touching, share, n if space.order == 1 else n + 1)
-    plain = [
+    touching_parts, is_far = _on_front(bary, r, size)
+    is_tiny = share < (1 - _SAME) * _TINY
+    is_coarse = (
+        is_far & (is_tiny | (r.min(axis=1) > (1 + _SAME) * _FAR * size)) & (space.order == 1)
+    )
+    swept_parts = _swept_points(touching_parts, share, n if space.order == 1 else n + 1)
+    plain_parts = [
         _rule_points(rows, bary[rows], share[rows], simplex_rule(3, degree))
         for rows, degree in (
-            (np.nonzero(far & ~coarse)[0], 2 * n - 3),
-            (np.nonzero(coarse)[0], max(n - 2, 1)),
+            (np.nonzero(is_far & ~is_coarse)[0], 2 * n - 3),
+            (np.nonzero(is_coarse)[0], max(n - 2, 1)),
         )
     ]
-    return _all_parts([*swept, *plain])
+    return _all_parts([*swept_parts, *plain_parts])
 
 
 def graded_points(
@@ -299,24 +301,24 @@ def graded_points(
     nodes = space.mesh.cells[cell]
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[nodes])
     r, size = radius_at(space, nodes, bary), _longest_edges(x)
-    touching, far = _on_front(bary, r, size)
-    swept = _swept_points(touching, share, n)
-    number = np.nonzero(far)[0]
+    touching_parts, is_far = _on_front(bary, r, size)
+    swept_parts = _swept_points(touching_parts, share, n)
+    number = np.nonzero(is_far)[0]
     bary, share, x, r, size = (each[number] for each in (bary, share, x, r, size))
     parts = []
     for _ in range(_BISECTIONS):
-        near = (r.min(axis=1) < (1 - _SAME) * _NEAR * size) & (share > (1 + _SAME) * _TINY / 8)
-        parts.append((number[~near], bary[~near], share[~near]))
-        if not near.any():
+        is_near = (r.min(axis=1) < (1 - _SAME) * _NEAR * size) & (share > (1 + _SAME) * _TINY / 8)
+        parts.append((number[~is_near], bary[~is_near], share[~is_near]))
+        if not is_near.any():
             break
-        number = np.concatenate([number[near], number[near]])
-        share = np.concatenate([share[near], share[near]]) / 2
-        bary, x = _halves(space, nodes[number[: len(number) // 2]], bary[near], x[near])
+        number = np.concatenate([number[is_near], number[is_near]])
+        share = np.concatenate([share[is_near], share[is_near]]) / 2
+        bary, x = _halves(space, nodes[number[: len(number) // 2]], bary[is_near], x[is_near])
         r, size = radius_at(space, nodes[number], bary), _longest_edges(x)
     else:
         parts.append((number, bary, share))
     rule = simplex_rule(3, degree)
-    return _all_parts([*swept, *(_rule_points(*part, rule) for part in parts)])
+    return _all_parts([*swept_parts, *(_rule_points(*part, rule) for part in parts)])
 
 
 _Parts = tuple[Ints, Floats, Floats]  # sub-cell, vertices or places, share
@@ -332,18 +334,18 @@ def _on_front(bary: Floats, r: Floats, size: Floats) -> tuple[list[tuple[Ints, F
     """Sub-cells with an edge on the front and with a vertex there, those first; and all others."""
     at = r < _AT * size[:, None]
     corner = np.take_along_axis(bary, np.argsort(~at, axis=1, kind="stable")[:, :, None], axis=1)
-    touches = at.sum(axis=1)
-    edge, far = touches == 2, touches == 0
-    rows = (np.nonzero(edge)[0], np.nonzero(~edge & ~far)[0])
-    return [(chosen, corner[chosen]) for chosen in rows], far
+    n_touching = at.sum(axis=1)
+    edge, is_far = n_touching == 2, n_touching == 0
+    rows = (np.nonzero(edge)[0], np.nonzero(~edge & ~is_far)[0])
+    return [(chosen, corner[chosen]) for chosen in rows], is_far
 
 
-def _swept_points(touching: list[tuple[Ints, Floats]], share: Floats, n: int) -> list[_Parts]:
+def _swept_points(touching_parts: list[tuple[Ints, Floats]], share: Floats, n: int) -> list[_Parts]:
     """Points in sub-cells with an edge and with a vertex on the front."""
     result = []
-    for (rows, corner), rule in zip(touching, (_edge_rule, _vertex_rule), strict=True):
-        tiny = share[rows] < (1 - _SAME) * _TINY
-        for chosen, k in ((~tiny, n), (tiny, max(n - 1, 2))):
+    for (rows, corner), rule in zip(touching_parts, (_edge_rule, _vertex_rule), strict=True):
+        is_tiny = share[rows] < (1 - _SAME) * _TINY
+        for chosen, k in ((~is_tiny, n), (is_tiny, max(n - 1, 2))):
             result.append(_rule_points(rows[chosen], corner[chosen], share[rows[chosen]], rule(k)))
     return result
 
@@ -369,9 +371,9 @@ def _halves(space: FunctionSpace, nodes: Ints, bary: Floats, x: Floats) -> tuple
     """
     i, j = local_edges(3).T
     length = np.linalg.norm(x[:, i] - x[:, j], axis=2)
-    most = length.max(axis=1, keepdims=True)
-    middle = radius_at(space, nodes, (bary[:, i] + bary[:, j]) / 2) / most
-    longest = length >= (1 - _SAME) * most
+    longest_edge = length.max(axis=1, keepdims=True)
+    middle = radius_at(space, nodes, (bary[:, i] + bary[:, j]) / 2) / longest_edge
+    longest = length >= (1 - _SAME) * longest_edge
     edge = np.where(longest, np.round(middle, 7), np.inf).argmin(axis=1)
     a, b, row = i[edge], j[edge], np.arange(len(x))
     halves = []
@@ -435,15 +437,15 @@ def triangle_points(r: Floats, size: Floats, degree: int = 4) -> tuple[Ints, Flo
     parts = []
     for level in (0, 1):
         at = r < _AT * size[:, None]
-        touches = at.sum(axis=1)
+        n_touching = at.sum(axis=1)
         first = np.argsort(~at, axis=1, kind="stable")
         corner = np.take_along_axis(corner, first[:, :, None], axis=1)
         r = np.take_along_axis(r, first, axis=1)
-        is_near = (touches == 0) & (r.min(axis=1) < _NEAR * size) & (level == 0)
+        is_near = (n_touching == 0) & (r.min(axis=1) < _NEAR * size) & (level == 0)
         for chosen, rule in (
-            (touches == 2, _side_rule()),
-            ((touches == 1) | (touches == 3), _corner_rule()),
-            ((touches == 0) & ~is_near, simplex_rule(2, degree)),
+            (n_touching == 2, _side_rule()),
+            ((n_touching == 1) | (n_touching == 3), _corner_rule()),
+            ((n_touching == 0) & ~is_near, simplex_rule(2, degree)),
         ):
             rows = np.nonzero(chosen)[0]
             place = np.einsum("pv,svb->spb", rule[0], corner[rows])
@@ -540,28 +542,30 @@ def at_joints(
         if joint.crack == c:
             continue
         near_points = np.nonzero(joint.near[cell])[0]
-        through = sides[near_points, joint.on]
+        side_of_through_crack = sides[near_points, joint.on]
         phi = space.cuts[joint.crack].level_set.phi[space.mesh.cells[cell[near_points]]]
         side_of_point = np.where(np.einsum("kb,kb->k", bary[near_points], phi) >= 0, 1, -1)
-        uncut = ~space.cuts[joint.on].is_cut[cell[near_points]]
-        changed = np.where(through == -joint.side, 0, side_of_point)
-        keep = (through == 0) | ((through == joint.side) & uncut & (c != joint.on))
-        sides[near_points, joint.crack] = np.where(keep, sides[near_points, joint.crack], changed)
+        is_uncut = ~space.cuts[joint.on].is_cut[cell[near_points]]
+        new_side = np.where(side_of_through_crack == -joint.side, 0, side_of_point)
+        keep = (side_of_through_crack == 0) | (
+            (side_of_through_crack == joint.side) & is_uncut & (c != joint.on)
+        )
+        sides[near_points, joint.crack] = np.where(keep, sides[near_points, joint.crack], new_side)
     return sides
 
 
 def part_numbers(space: FunctionSpace, cell: Ints, sides: Ints) -> Ints:
     """Which part of its cell a point lies in `(k,)`, from 0 to `n_parts` - 1, by its sides."""
-    plus = np.zeros(len(cell), dtype=bool)
+    is_above = np.zeros(len(cell), dtype=bool)
     is_beside = np.zeros(len(cell), dtype=bool)
     for c, cut in enumerate(space.cuts):
-        above = cut.is_cut[cell] & (sides[:, c] > 0)
+        is_above_crack = cut.is_cut[cell] & (sides[:, c] > 0)
         for joint in space.joints:
             if joint.crack == c:
-                is_beside |= above & joint.both[cell]
-                above = above & ~joint.both[cell]
-        plus |= above
-    return plus + 2 * is_beside.astype(np.int64)
+                is_beside |= is_above_crack & joint.both[cell]
+                is_above_crack = is_above_crack & ~joint.both[cell]
+        is_above |= is_above_crack
+    return is_above + 2 * is_beside.astype(np.int64)
 
 
 def n_parts(space: FunctionSpace) -> int:
@@ -687,32 +691,32 @@ def _sub_cells_at_ends_of_fronts(space: FunctionSpace, subs: SubCells) -> SubCel
 
 
 def _split_along(
-    space: FunctionSpace, subs: SubCells, values: Floats, chosen: Bools, tiny: float
+    space: FunctionSpace, subs: SubCells, values: Floats, chosen: Bools, tolerance: float
 ) -> SubCells:
     """Chosen sub-cells split along the zero of a linear function, in their order."""
     nodes = space.mesh.cells[subs.cell]
     value = np.einsum("svb,sb->sv", subs.bary, values[nodes])
-    small = np.abs(value) < tiny * np.abs(value).max(axis=1, keepdims=True)
-    value[small] = 0.0
+    is_small = np.abs(value) < tolerance * np.abs(value).max(axis=1, keepdims=True)
+    value[is_small] = 0.0
     split = chosen & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
-    unsplit, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
+    whole_parts, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
     x = np.einsum("svb,sbd->svd", subs.bary[rows], space.mesh.points[nodes[rows]])
     inner, share, _, parent = cut_simplices(value[rows], x)
-    source = np.concatenate([unsplit, rows[parent]])
+    source = np.concatenate([whole_parts, rows[parent]])
     order = np.argsort(source, kind="stable")
-    finer = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
+    bary_of_parts = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
     source = source[order]
     return SubCells(
         subs.cell[source],
-        np.concatenate([subs.bary[unsplit], finer])[order],
-        subs.fraction[source] * np.concatenate([np.ones(len(unsplit)), share])[order],
+        np.concatenate([subs.bary[whole_parts], bary_of_parts])[order],
+        subs.fraction[source] * np.concatenate([np.ones(len(whole_parts)), share])[order],
         subs.side[source],
         subs.fan[source],
     )
 
 
 def cell_points(
-    space: FunctionSpace, cells: Ints, n: int, degree: int, graded: bool = False
+    space: FunctionSpace, cells: Ints, n: int, degree: int, is_graded: bool = False
 ) -> Points:
     """Integration points of cells, sorted by cell.
 
@@ -724,22 +728,22 @@ def cell_points(
         Points a direction where tip functions act.
     degree : int
         Degree of polynomials integrated exactly elsewhere.
-    graded : bool
+    is_graded : bool
         In 3D: sub-cells on which tip functions act, and which do not touch a front, are bisected
         towards it and have a rule of that degree too.
     """
     subs = sub_cells(space, cells)
     with_tip = space.has_tip[subs.cell]
-    plain = (~with_tip).nonzero()[0]
+    plain_rows = (~with_tip).nonzero()[0]
     bary, weight = simplex_rule(space.dim, degree)
-    number = np.repeat(plain, len(weight))
-    where = np.einsum("pv,svb->spb", bary, subs.bary[plain]).reshape(-1, space.dim + 1)
-    share = np.outer(subs.fraction[plain], weight).ravel()
+    number = np.repeat(plain_rows, len(weight))
+    where = np.einsum("pv,svb->spb", bary, subs.bary[plain_rows]).reshape(-1, space.dim + 1)
+    share = np.outer(subs.fraction[plain_rows], weight).ravel()
     rows = with_tip.nonzero()[0]
     if not len(rows):
         return _sorted_points(space, subs, number, where, share)
     is_near = (subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n)
-    if graded:
+    if is_graded:
         sub, place, part = graded_points(space, *is_near, degree)
     else:
         sub, place, part = _NEAR_TIPS[space.dim](space, *is_near)

@@ -72,14 +72,14 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> System:
         or bulk_.elasticity.material != problem.material
     ):
         bulk_ = bulk(problem.elasticity, order)
-    enriched, n_points, reusable = enriched_stiffness(
+    blocks, n_points, reused = enriched_stiffness(
         space, problem.elasticity, problem.numerics, lips, bulk_.cells
     )
     return System(
         space,
         lips,
-        replace(bulk_, cells=reusable),
-        enriched,
+        replace(bulk_, cells=reused),
+        blocks,
         known_unknowns(space, tuple(problem.supports)),
         n_points,
     )
@@ -90,12 +90,14 @@ def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
     mesh, numerics = problem.mesh, problem.numerics
     cracks = tuple(on_mesh(crack, mesh) for crack in problem.placed)
     junctions = problem.junctions
-    drawn = prolonged_cracks(cracks, junctions) if junctions and mesh.dim == 2 else cracks
-    level_sets = [levels(mesh, crack, numerics) for crack in drawn]
+    level_set_cracks = (
+        prolonged_cracks(cracks, junctions) if junctions and mesh.dim == 2 else cracks
+    )
+    level_sets = [levels(mesh, crack, numerics) for crack in level_set_cracks]
     if junctions and mesh.dim == 3:
         for on in {junction.on for junction in junctions}:
-            reach = front_reach(mesh, drawn[on], numerics.radius)
-            level_sets[on] = with_far_sides(mesh, drawn[on], level_sets[on], reach)
+            reach = front_reach(mesh, level_set_cracks[on], numerics.radius)
+            level_sets[on] = with_far_sides(mesh, level_set_cracks[on], level_sets[on], reach)
     cuts = tuple(cut(mesh, each) for each in level_sets)
     joints: tuple[Joint, ...] = ()
     if junctions:

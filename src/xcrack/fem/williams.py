@@ -11,21 +11,21 @@ def polar(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
     `side` is +1 or -1 where the point belongs to a known side of the crack, else 0. A point with
     phi = 0 exactly has atan2 = +pi on both crack faces; its side decides.
     """
-    tiny = 1e-300
-    forced = np.where((side != 0) & (phi * side <= 0), side * tiny, phi)
-    return np.hypot(psi, phi), np.arctan2(forced, psi)
+    smallest = 1e-300
+    phi_on_side = np.where((side != 0) & (phi * side <= 0), side * smallest, phi)
+    return np.hypot(psi, phi), np.arctan2(phi_on_side, psi)
 
 
-def continued_polar(xi: Floats, side: Ints, behind: Bools) -> tuple[Floats, Floats]:
+def continued_polar(xi: Floats, side: Ints, is_kinked_face: Bools) -> tuple[Floats, Floats]:
     """Polar coordinates at a tip, the cut of the angle following the real lips.
 
     A point on side + of a crack that bends down may have a negative polar angle: it is continued
-    by a turn, so that the auxiliary field jumps where the crack is. `behind` gives the side of
-    the crack from that of its prolongation ahead.
+    by a turn, so that the auxiliary field jumps where the crack is. `is_kinked_face` gives the side
+    of the crack from that of its prolongation ahead.
     """
     r = np.hypot(xi[:, 0], xi[:, 1])
     theta = np.arctan2(xi[:, 1], xi[:, 0])
-    is_behind = behind & (side != 0)
+    is_behind = is_kinked_face & (side != 0)
     theta = np.where(is_behind & (side > 0) & (theta < 0), theta + 2 * np.pi, theta)
     return r, np.where(is_behind & (side < 0) & (theta > 0), theta - 2 * np.pi, theta)
 
@@ -52,9 +52,9 @@ def tip_derivatives(r: Floats, theta: Floats, n: int = 4) -> tuple[Floats, Float
     g, dg = angular(theta)
     scale = 1 / np.sqrt(r)[..., None]
     C, S = np.cos(theta)[..., None], np.sin(theta)[..., None]
-    ahead = scale * (0.5 * g * C - dg * S)
+    slope_ahead = scale * (0.5 * g * C - dg * S)
     normal = scale * (0.5 * g * S + dg * C)
-    return ahead[..., :n], normal[..., :n]
+    return slope_ahead[..., :n], normal[..., :n]
 
 
 def mode_matrix(kolosov: float, mu: float) -> Floats:
@@ -76,13 +76,15 @@ def unit_gradients(r: Floats, theta: Floats, kolosov: float, mu: float) -> Float
     leaves free of traction: sigma_rr = -cos(theta) / (pi r) (Michell, 1902); it is the field of T.
     """
     modes = mode_matrix(kolosov, mu)
-    ahead, normal = tip_derivatives(r, theta)
-    fields = [np.stack([ahead @ mode.T, normal @ mode.T], axis=-1) for mode in modes]
+    slope_ahead, normal = tip_derivatives(r, theta)
+    fields = [np.stack([slope_ahead @ mode.T, normal @ mode.T], axis=-1) for mode in modes]
     c, s = np.cos(theta), np.sin(theta)
-    radial = -c / (np.pi * r)
-    outward = np.stack([c, s], axis=-1)
-    stress = radial[:, None, None] * outward[:, :, None] * outward[:, None, :]
-    force = (stress - (3 - kolosov) / 4 * radial[:, None, None] * np.eye(2)) / (2 * mu)
+    radial_stress = -c / (np.pi * r)
+    radial_direction = np.stack([c, s], axis=-1)
+    stress = (
+        radial_stress[:, None, None] * radial_direction[:, :, None] * radial_direction[:, None, :]
+    )
+    force = (stress - (3 - kolosov) / 4 * radial_stress[:, None, None] * np.eye(2)) / (2 * mu)
     # The rotation is part of the gradient.
     turn = (kolosov + 1) / (8 * mu * np.pi) * s / r
     force[:, 0, 1] -= turn

@@ -204,7 +204,7 @@ def respond(
         )
     plane = problem.mesh.dim < 3  # of fronts, the bars need no factor
     solved = solve_states(
-        problem, states, reuse=reuse, solver=solver, repeated=True, error=bars and plane
+        problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
     )
     handed_on = solved[0].reuse
     light = handed_on.without_factor()

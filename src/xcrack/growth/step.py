@@ -536,7 +536,10 @@ class Step:
         counts = [[len(sif.x) for sif in state] for state in states]
         for name in ("angle", "dK_eq", "R", "rate", "da"):
             parts = entries(getattr(self, name), f"Step: {name}")
-            shapes = [numbers(part, f"Step: {name}", (None,), finite=False).shape for part in parts]
+            shapes = [
+                numbers(part, f"Step: {name}", (None,), must_be_finite=False).shape
+                for part in parts
+            ]
             counts.append([shape[0] for shape in shapes])
         n = len(self.cracks)
         if any(count != counts[0] for count in counts) or len(counts[0]) not in (0, n):
@@ -562,7 +565,7 @@ class Step:
             object.__setattr__(self, name, parts)
             rows = counts if len(parts) == len(counts) else [None] * len(parts)
             for part, n in zip(parts, rows, strict=True):
-                numbers(part, f"Step: {name}", (n, *columns), finite=False)
+                numbers(part, f"Step: {name}", (n, *columns), must_be_finite=False)
         for name, kind in _MADE_BY_GROW.items():
             value = getattr(self, name)
             if not (isinstance(value, kind) or (value is None and name != "control")):

@@ -39,42 +39,42 @@ def active_set(
     ConvergenceError
         The fallback does not satisfy the conditions either.
     """
-    visited: set[bytes] = set()
-    active = np.array(start, dtype=bool)
+    visited_sets: set[bytes] = set()
+    is_active = np.array(start, dtype=bool)
     for iteration in range(1, _MAX_SETS + 1):
-        pressure, gap = of_set(F, d, active)
+        pressure, gap = of_set(F, d, is_active)
         # Values at round-off of zero (faces that only touch) must not make the set flicker.
         lam_scale = 1e-13 * float(np.abs(pressure).max(initial=0.0))
         trial = pressure - stiffness * gap / measure
-        new = trial > lam_scale
-        if (new == active).all():
-            return StateContact(pressure, gap, active, iteration)
-        key = new.tobytes()
-        if key in visited:
+        next_set = trial > lam_scale
+        if (next_set == is_active).all():
+            return StateContact(pressure, gap, is_active, iteration)
+        key = next_set.tobytes()
+        if key in visited_sets:
             break
-        visited.add(key)
-        active = new
-    return _least_squares_set(F, d, len(visited))
+        visited_sets.add(key)
+        is_active = next_set
+    return _least_squares_set(F, d, len(visited_sets))
 
 
-def of_set(F: Floats, d: Floats, active: Bools) -> tuple[Floats, Floats]:
+def of_set(F: Floats, d: Floats, is_active: Bools) -> tuple[Floats, Floats]:
     """Pressures that close the groups of a set, and the gaps they leave."""
     pressure = np.zeros(len(d))
-    if active.any():
+    if is_active.any():
         # Groups differ in size by many orders of magnitude: scaled, the matrix is well conditioned.
-        scale = _scale(F)[active]
-        block = F[np.ix_(active, active)] * scale[:, None] * scale
-        pressure[active] = scale * _smallest_solution(block, -d[active] * scale)
+        scale = _scale(F)[is_active]
+        block = F[np.ix_(is_active, is_active)] * scale[:, None] * scale
+        pressure[is_active] = scale * _smallest_solution(block, -d[is_active] * scale)
     gap = F @ pressure + d
-    gap[active] = 0.0
+    gap[is_active] = 0.0
     return pressure, gap
 
 
 def _scale(F: Floats) -> Floats:
     """Inverse roots of the diagonal, 0 for a group that no free unknown can move."""
     diagonal = np.diag(F)
-    moved = diagonal > 0
-    return np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
+    is_movable = diagonal > 0
+    return np.where(is_movable, 1 / np.sqrt(np.where(is_movable, diagonal, 1.0)), 0.0)
 
 
 def _smallest_solution(A: Floats, b: Floats) -> Floats:
@@ -88,22 +88,22 @@ def _smallest_solution(A: Floats, b: Floats) -> Floats:
     return np.asarray(scipy.linalg.lstsq(A, b, cond=_REDUNDANT**2)[0])
 
 
-def _least_squares_set(F: Floats, d: Floats, tried: int) -> StateContact:
+def _least_squares_set(F: Floats, d: Floats, n_tried: int) -> StateContact:
     """Non-negative least squares on a root of F (Lawson and Hanson, 1974)."""
     scale = _scale(F)
     w, V = np.linalg.eigh((F + F.T) / 2 * scale[:, None] * scale)
-    resolved = w > _REDUNDANT**2 * w[-1]
-    root = np.sqrt(w[resolved])
-    rhs = -(V[:, resolved].T @ (scale * d)) / root
-    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, resolved].T, rhs)
-    active = guess > 0
-    pressure, gap = of_set(F, d, active)
+    is_resolved = w > _REDUNDANT**2 * w[-1]
+    root = np.sqrt(w[is_resolved])
+    rhs = -(V[:, is_resolved].T @ (scale * d)) / root
+    guess, _ = scipy.optimize.nnls(root[:, None] * V[:, is_resolved].T, rhs)
+    is_active = guess > 0
+    pressure, gap = of_set(F, d, is_active)
     size = float(np.abs(d).max(initial=0.0))
     if (gap < -1e-8 * size).any() or (pressure < -1e-8 * np.abs(pressure).max(initial=0)).any():
         raise ConvergenceError(
-            f"contact: after {tried} sets and non-negative least squares, {int(active.sum())} of "
-            f"{len(d)} groups are closed, with a smallest gap of {gap.min():.3g} and a smallest "
+            f"contact: after {n_tried} sets and non-negative least squares, {int(is_active.sum())} "
+            f"of {len(d)} groups are closed, with a smallest gap of {gap.min():.3g} and a smallest "
             f"pressure of {pressure.min():.3g}. Refine the mesh along the crack, or start from "
             'Numerics(initial_set="open").'
         )
-    return StateContact(np.maximum(pressure, 0.0), gap, active, tried, fallback=True)
+    return StateContact(np.maximum(pressure, 0.0), gap, is_active, n_tried, fallback=True)

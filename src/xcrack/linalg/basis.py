@@ -59,9 +59,9 @@ def node_blocks(space: FunctionSpace, kind: str) -> Blocks:
         for c, number in enumerate(space.heaviside):
             nodes = np.nonzero(number >= 0)[0]
             owner[number[nodes]] = _star_home(space, c, nodes)
-    enriched = np.arange(space.n_nodes, space.n_functions)
-    order = np.argsort(owner[enriched], kind="stable")
-    functions = enriched[order]
+    tip_functions = np.arange(space.n_nodes, space.n_functions)
+    order = np.argsort(owner[tip_functions], kind="stable")
+    functions = tip_functions[order]
     nodes, counts = np.unique(owner[functions], return_counts=True)
     d = space.dim
     row, place = ranges(1 + counts)
@@ -80,8 +80,8 @@ def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     is_edge = nodes >= n
     edge = nodes[is_edge] - n
     ends = mesh.edges[edge]
-    farthest = np.argmax(np.abs(cut.level_set.phi[ends]), axis=1)
-    end = ends[np.arange(len(ends)), farthest]
+    end_of_edge = np.argmax(np.abs(cut.level_set.phi[ends]), axis=1)
+    end = ends[np.arange(len(ends)), end_of_edge]
     distance = np.abs(cut.level_set.phi[ends])
     on_crack = distance.min(axis=1) < _BESIDE * distance.max(axis=1)
     move = (~np.isnan(cut.cut_edge[edge]) | on_crack) & (space.heaviside[c][end] >= 0)
@@ -89,9 +89,9 @@ def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     return home
 
 
-def restricted(blocks: Blocks, free: Bools) -> Blocks:
+def restricted(blocks: Blocks, is_free: Bools) -> Blocks:
     """Blocks without the unknowns that supports decide."""
-    keep = free[blocks.members]
+    keep = is_free[blocks.members]
     block, place = ranges(np.diff(blocks.offsets))
     standard = np.bincount(
         block[keep & (place < blocks.n_standard[block])], minlength=len(blocks.n_standard)
@@ -119,15 +119,15 @@ def _by_shape(K: sp.csr_matrix, blocks: Blocks) -> list[tuple[Ints, Floats, int]
     from xcrack.linalg.kernels.sparse import dense_blocks
 
     size = np.diff(blocks.offsets)
-    flat = dense_blocks(K.indptr, K.indices, K.data, blocks.members, blocks.offsets)
+    blocks_in_row = dense_blocks(K.indptr, K.indices, K.data, blocks.members, blocks.offsets)
     start = offsets(size**2)
     groups = []
     for s, n_standard in sorted(set(zip(size.tolist(), blocks.n_standard.tolist(), strict=True))):
         if s == n_standard:
             continue
-        which = np.nonzero((size == s) & (blocks.n_standard == n_standard))[0]
-        members = blocks.members[blocks.offsets[which][:, None] + np.arange(s)]
-        k = flat[start[which][:, None] + np.arange(s * s)].reshape(-1, s, s)
+        numbers = np.nonzero((size == s) & (blocks.n_standard == n_standard))[0]
+        members = blocks.members[blocks.offsets[numbers][:, None] + np.arange(s)]
+        k = blocks_in_row[start[numbers][:, None] + np.arange(s * s)].reshape(-1, s, s)
         groups.append((members, k, n_standard))
     return groups
 
@@ -148,7 +148,7 @@ def stars(mesh: Mesh, order: int) -> sp.csr_matrix:
 
 
 def patch_orthogonal(
-    space: FunctionSpace, K: sp.csr_matrix, free: Bools, around: str = "cells"
+    space: FunctionSpace, K: sp.csr_matrix, is_free: Bools, patch_kind: str = "cells"
 ) -> sp.csr_matrix:
     """Basis in which tip functions are orthogonal to the functions around them.
 
@@ -158,7 +158,7 @@ def patch_orthogonal(
     """
     d = space.dim
     start, cells = space.mesh.point_to_cell
-    star = stars(space.mesh, space.order) if around == "star" else None
+    star = stars(space.mesh, space.order) if patch_kind == "star" else None
     rows, columns, values = (
         [np.arange(space.n_dof)],
         [np.arange(space.n_dof)],
@@ -175,7 +175,7 @@ def patch_orthogonal(
             patch = (np.concatenate(functions)[:, None] * d + np.arange(d)).ravel()
             functions_of_tip = tip.point_to_function[point] + np.arange(tip.functions)
             F = (functions_of_tip[:, None] * d + np.arange(d)).ravel()
-            patch, F = patch[free[patch]], F[free[F]]
+            patch, F = patch[is_free[patch]], F[is_free[F]]
             members.append(np.concatenate([patch, F]))
             counts.append(len(patch) + len(F))
             n_patch.append(len(patch))

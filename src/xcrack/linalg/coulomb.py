@@ -117,10 +117,10 @@ class FrictionState:
 
 def all_stuck(rows: FrictionRows) -> Status:
     """The status that is tried where nothing is known."""
-    closed, shape = np.ones(rows.n, dtype=bool), (rows.tangents, len(rows.mu))
+    is_closed, shape = np.ones(rows.n, dtype=bool), (rows.tangents, len(rows.mu))
     if rows.tangents == 1:
-        return Status(closed, np.zeros(len(rows.mu), dtype=np.int64))
-    return Status(closed, np.zeros(shape))
+        return Status(is_closed, np.zeros(len(rows.mu), dtype=np.int64))
+    return Status(is_closed, np.zeros(shape))
 
 
 def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
@@ -139,18 +139,18 @@ def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
     ConvergenceError
         Neither Newton nor Gauss-Seidel find a status that stays.
     """
-    tried = 0
+    sets_tried = 0
     lam, status = np.zeros(len(d)), start
     for sweeps in _SWEEPS:
         if sweeps:
             lam = _sweep_functions(rows, d, lam, sweeps)
             status = _status_of(rows, lam)
         state, sets = _newton(rows, d, status)
-        tried += sets
+        sets_tried += sets
         if state is not None:
-            return FrictionState(state.lam, state.gap, state.status, tried)
+            return FrictionState(state.lam, state.gap, state.status, sets_tried)
     raise ConvergenceError(
-        f"contact with friction: after {tried} sets and {sum(_SWEEPS)} sweeps the status of "
+        f"contact with friction: after {sets_tried} sets and {sum(_SWEEPS)} sweeps the status of "
         f"{rows.n} groups still changes. Give a smaller friction (here up to {rows.mu.max():.3g}), "
         "or refine the mesh along the crack."
     )
@@ -158,28 +158,28 @@ def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
 
 def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Floats]:
     """Tractions that a status asks for, and the gaps and slips that they leave."""
-    g, closed, slip = rows.n, status.closed, status.slip
-    shut = np.nonzero(closed)[0]
-    touching = closed[rows.rubbing]
-    stuck = np.nonzero(touching & (slip == 0))[0]
-    slipping = np.nonzero(touching & (slip != 0))[0]
+    g, is_closed, slip = rows.n, status.closed, status.slip
+    closed_rows = np.nonzero(is_closed)[0]
+    is_touching = is_closed[rows.rubbing]
+    stuck_rows = np.nonzero(is_touching & (slip == 0))[0]
+    slipping_rows = np.nonzero(is_touching & (slip != 0))[0]
     lam = np.zeros(len(d))
-    active = np.concatenate([shut, g + stuck])
-    if len(active):
+    active_rows = np.concatenate([closed_rows, g + stuck_rows])
+    if len(active_rows):
         place = np.zeros(g, dtype=np.int64)
-        place[shut] = np.arange(len(shut))
+        place[closed_rows] = np.arange(len(closed_rows))
         # The traction of a slipping function goes with its pressure.
-        spread = np.zeros((len(d), len(active)))
-        spread[active, np.arange(len(active))] = 1.0
-        pressed = place[rows.rubbing[slipping]]
-        spread[g + slipping, pressed] = slip[slipping] * rows.mu[slipping]
-        diagonal = np.diag(rows.F)[active]
-        moved = diagonal > 0
-        scale = np.where(moved, 1 / np.sqrt(np.where(moved, diagonal, 1.0)), 0.0)
-        A = (rows.F[active] @ spread) * scale[:, None] * scale
-        lam = spread @ (scale * smallest_solution(A, -d[active] * scale))
+        spread = np.zeros((len(d), len(active_rows)))
+        spread[active_rows, np.arange(len(active_rows))] = 1.0
+        column = place[rows.rubbing[slipping_rows]]
+        spread[g + slipping_rows, column] = slip[slipping_rows] * rows.mu[slipping_rows]
+        diagonal = np.diag(rows.F)[active_rows]
+        is_movable = diagonal > 0
+        scale = np.where(is_movable, 1 / np.sqrt(np.where(is_movable, diagonal, 1.0)), 0.0)
+        A = (rows.F[active_rows] @ spread) * scale[:, None] * scale
+        lam = spread @ (scale * smallest_solution(A, -d[active_rows] * scale))
     gap = rows.F @ lam + d
-    gap[active] = 0.0
+    gap[active_rows] = 0.0
     return lam, gap
 
 
@@ -194,33 +194,35 @@ def smallest_solution(A: Floats, b: Floats) -> Floats:
 
 
 def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionState | None, int]:
-    g, visited = rows.n, set()
+    g, visited_keys = rows.n, set()
     weight = rows.stiffness / rows.measure
     for sets in range(1, _MOST + 1):
         lam, gap = of_status(rows, d, status)
         tolerance = _ROUND_OFF * float(np.abs(lam).max(initial=0.0))
         normal = lam[:g] - weight * gap[:g]
-        along = lam[g:] - weight[rows.rubbing] * gap[g:]
+        trial_shear = lam[g:] - weight[rows.rubbing] * gap[g:]
         # Values at round-off of zero (faces that only touch) must not make the status flicker.
-        closed = normal > 0.1 * tolerance
+        is_closed = normal > 0.1 * tolerance
         bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
-        slides = closed[rows.rubbing] & (np.abs(along) > bound + tolerance)
-        new = Status(closed, np.where(slides, np.sign(along), 0.0).astype(np.int64))
-        if new.key() == status.key():
+        is_sliding = is_closed[rows.rubbing] & (np.abs(trial_shear) > bound + tolerance)
+        next_status = Status(
+            is_closed, np.where(is_sliding, np.sign(trial_shear), 0.0).astype(np.int64)
+        )
+        if next_status.key() == status.key():
             return FrictionState(lam, gap, status, sets), sets
-        if new.key() in visited:
+        if next_status.key() in visited_keys:
             return None, sets
-        visited.add(new.key())
-        status = new
+        visited_keys.add(next_status.key())
+        status = next_status
     return None, _MOST
 
 
 def _status_of(rows: FrictionRows, lam: Floats) -> Status:
     pressure, shear = lam[: rows.n], lam[rows.n :]
-    closed = pressure > 0
+    is_closed = pressure > 0
     bound = rows.mu * pressure[rows.rubbing]
-    slides = closed[rows.rubbing] & (np.abs(shear) >= bound * (1 - 1e-9))
-    return Status(closed, np.where(slides, np.sign(shear), 0.0).astype(np.int64))
+    is_sliding = is_closed[rows.rubbing] & (np.abs(shear) >= bound * (1 - 1e-9))
+    return Status(is_closed, np.where(is_sliding, np.sign(shear), 0.0).astype(np.int64))
 
 
 def _sweep_functions(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
@@ -236,21 +238,21 @@ def _sweep_functions(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) ->
             j = int(partner[i])
             rows_of_function = [i] if j < 0 else [i, g + j]
             block = F[np.ix_(rows_of_function, rows_of_function)]
-            free = gap[rows_of_function] - block @ lam[rows_of_function]
-            new = _tractions_of_one(block, free, 0.0 if j < 0 else float(rows.mu[j]))
-            change = new - lam[rows_of_function]
+            free_gap = gap[rows_of_function] - block @ lam[rows_of_function]
+            new_tractions = _tractions_of_one(block, free_gap, 0.0 if j < 0 else float(rows.mu[j]))
+            change = new_tractions - lam[rows_of_function]
             if change.any():
                 gap += F[:, rows_of_function] @ change
-                lam[rows_of_function] = new
+                lam[rows_of_function] = new_tractions
     return lam
 
 
-def _tractions_of_one(block: Floats, free: Floats, mu: float) -> Floats:
+def _tractions_of_one(block: Floats, free_gap: Floats, mu: float) -> Floats:
     """Tractions of one function whose gap and slip without them are given."""
-    a, gap = float(block[0, 0]), float(free[0])
-    if len(free) == 1:
+    a, gap = float(block[0, 0]), float(free_gap[0])
+    if len(free_gap) == 1:
         return np.array([max(-gap / a, 0.0)])
-    b, c, slip = float(block[0, 1]), float(block[1, 1]), float(free[1])
+    b, c, slip = float(block[0, 1]), float(block[1, 1]), float(free_gap[1])
     det = a * c - b * b
     if det > 0:
         pressure, shear = (-gap * c + slip * b) / det, (-slip * a + gap * b) / det
@@ -307,7 +309,7 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
     ConvergenceError
         Neither Newton nor projections settle.
     """
-    tried = 0
+    sets_tried = 0
     guess = FrictionStart(start.closed, start.slip.astype(float), np.zeros(len(rows.mu)))
     lam = np.zeros(len(d))
     for sweeps in _SWEEPS_OVER_CONES:
@@ -315,11 +317,11 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
             lam = _swept_cones(rows, d, lam, sweeps)
             guess = _next_status(rows, lam, rows.F @ lam + d)
         state, sets = _newton_on_cones(rows, d, guess)
-        tried += sets
+        sets_tried += sets
         if state is not None:
-            return FrictionState(state.lam, state.gap, state.status, tried)
+            return FrictionState(state.lam, state.gap, state.status, sets_tried)
     raise ConvergenceError(
-        f"contact with friction: after {tried} steps of Newton and {sum(_SWEEPS_OVER_CONES)} "
+        f"contact with friction: after {sets_tried} steps of Newton and {sum(_SWEEPS_OVER_CONES)} "
         f"sweeps the tractions of {rows.n} groups still change. Give a smaller friction (here up "
         f"to {rows.mu.max():.3g}), or refine the mesh along the crack."
     )
@@ -328,23 +330,25 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
 def _newton_on_cones(
     rows: FrictionRows, d: Floats, guess: FrictionStart
 ) -> tuple[FrictionState | None, int]:
-    before, last = np.full(len(d), np.inf), np.inf
+    previous_lam, last = np.full(len(d), np.inf), np.inf
     for sets in range(1, _MOST_CONES + 1):
         lam, gap = _linearised_solution(rows, d, guess)
-        new = _next_status(rows, lam, gap)
+        next_guess = _next_status(rows, lam, gap)
         largest = float(np.abs(lam).max(initial=0.0))
-        change = float(np.abs(lam - before).max(initial=0.0)) if sets > 1 else np.inf
-        same_status = np.array_equal(new.closed, guess.closed) and np.array_equal(
-            new.direction.any(axis=0), guess.direction.any(axis=0)
+        change = float(np.abs(lam - previous_lam).max(initial=0.0)) if sets > 1 else np.inf
+        same_status = np.array_equal(next_guess.closed, guess.closed) and np.array_equal(
+            next_guess.direction.any(axis=0), guess.direction.any(axis=0)
         )
-        turned = new.direction - guess.direction
+        direction_change = next_guess.direction - guess.direction
         bound = rows.mu * np.maximum(lam[: rows.n], 0.0)[rows.rubbing]
-        wrong = float(np.abs(bound * turned).max(initial=0.0))
-        is_settled = wrong <= _CHANGE * largest
-        stalled = wrong <= _STALL * largest and change >= 0.5 * last
-        if same_status and (is_settled or stalled):
-            return FrictionState(lam, gap, Status(new.closed, new.direction), sets), sets
-        before, last, guess = lam, change, new
+        error = float(np.abs(bound * direction_change).max(initial=0.0))
+        is_settled = error <= _CHANGE * largest
+        is_stalled = error <= _STALL * largest and change >= 0.5 * last
+        if same_status and (is_settled or is_stalled):
+            return FrictionState(
+                lam, gap, Status(next_guess.closed, next_guess.direction), sets
+            ), sets
+        previous_lam, last, guess = lam, change, next_guess
     return None, _MOST_CONES
 
 
@@ -354,14 +358,14 @@ def _next_status(rows: FrictionRows, lam: Floats, gap: Floats) -> FrictionStart:
     tolerance = 1e-12 * float(np.abs(lam).max(initial=0.0))
     normal = lam[:g] - weight * gap[:g]
     trial = (lam[g:] - np.tile(weight[rows.rubbing], 2) * gap[g:]).reshape(2, -1)
-    closed = normal > 0.1 * tolerance
+    is_closed = normal > 0.1 * tolerance
     bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
     size = np.sqrt((trial**2).sum(axis=0))
-    slides = closed[rows.rubbing] & (size > bound + tolerance)
-    length = np.where(slides, size, 1.0)
-    pressed = rows.mu * np.maximum(lam[:g], 0.0)[rows.rubbing]
-    share = np.where(slides, np.minimum(pressed / length, 1.0), 0.0)
-    return FrictionStart(closed, np.where(slides, trial / length, 0.0), share)
+    is_sliding = is_closed[rows.rubbing] & (size > bound + tolerance)
+    length = np.where(is_sliding, size, 1.0)
+    bound_of_row = rows.mu * np.maximum(lam[:g], 0.0)[rows.rubbing]
+    share = np.where(is_sliding, np.minimum(bound_of_row / length, 1.0), 0.0)
+    return FrictionStart(is_closed, np.where(is_sliding, trial / length, 0.0), share)
 
 
 def _linearised_solution(
@@ -369,63 +373,65 @@ def _linearised_solution(
 ) -> tuple[Floats, Floats]:
     """Tractions of the linearised conditions, and the gaps and slips that they leave."""
     g, r = rows.n, len(rows.mu)
-    shut = np.nonzero(guess.closed)[0]
-    touching = np.nonzero(guess.closed[rows.rubbing])[0]
-    active = np.concatenate([shut, g + touching, g + r + touching])
+    closed_rows = np.nonzero(guess.closed)[0]
+    touching_rows = np.nonzero(guess.closed[rows.rubbing])[0]
+    active_rows = np.concatenate([closed_rows, g + touching_rows, g + r + touching_rows])
     lam = np.zeros(len(d))
-    slides = np.asarray(guess.direction.any(axis=0))[touching]
-    if len(active):
+    is_sliding = np.asarray(guess.direction.any(axis=0))[touching_rows]
+    if len(active_rows):
         diagonal = rows.F.diagonal()
-        one = np.concatenate([shut, g + touching, g + touching])  # one scale for both tangents
+        one = np.concatenate(
+            [closed_rows, g + touching_rows, g + touching_rows]
+        )  # one scale for both tangents
         size = diagonal[one]
         scale = np.where(size > 0, 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
-        A = rows.F[np.ix_(active, active)] * scale[:, None] * scale
-        b = -d[active] * scale
-        _put_slip_conditions(rows, guess, A, b, shut, touching, slides, scale)
-        lam[active] = scale * smallest_solution(A, b)
+        A = rows.F[np.ix_(active_rows, active_rows)] * scale[:, None] * scale
+        b = -d[active_rows] * scale
+        _put_slip_conditions(rows, guess, A, b, closed_rows, touching_rows, is_sliding, scale)
+        lam[active_rows] = scale * smallest_solution(A, b)
     gap = rows.F @ lam + d
-    gap[shut] = 0.0
+    gap[closed_rows] = 0.0
     for part in (g, g + r):
-        gap[part + touching[~slides]] = 0.0
+        gap[part + touching_rows[~is_sliding]] = 0.0
     return lam, gap
 
 
 def _put_slip_conditions(
-    rows: FrictionRows, guess: FrictionStart, A: Floats, b: Floats, shut: Ints, touching: Ints,
-    slides: Bools, scale: Floats,
+    rows: FrictionRows, guess: FrictionStart, A: Floats, b: Floats, closed_rows: Ints,
+    touching_rows: Ints, is_sliding: Bools, scale: Floats,
 ) -> None:  # fmt: skip
     """Put the conditions of slipping functions in the place of those of stuck ones.
 
     Scaled tractions x = lam / scale; k weighs slips, so that both terms are tractions:
     x_t - mu s x_n - share (1 - s s') (x_t - k (A x - b)_t) = 0.
     """
-    m, n = len(shut), len(touching)
-    chosen = np.nonzero(slides)[0]
+    m, n = len(closed_rows), len(touching_rows)
+    chosen = np.nonzero(is_sliding)[0]
     if not len(chosen):
         return
     place = np.zeros(rows.n, dtype=np.int64)
-    place[shut] = np.arange(m)
-    number = touching[chosen]
+    place[closed_rows] = np.arange(m)
+    number = touching_rows[chosen]
     s, share, mu = guess.direction[:, number], guess.share[number], rows.mu[number]
     t = [m + chosen, m + n + chosen]
-    pressed = place[rows.rubbing[number]]
+    column = place[rows.rubbing[number]]
     scale_of_slip = np.array([scale[t[0]], scale[t[1]]])
     weight = (rows.stiffness / rows.measure)[rows.rubbing[number]]
     slip = np.stack([A[t[0]] / scale_of_slip[0][:, None], A[t[1]] / scale_of_slip[1][:, None]])
-    free = np.stack([b[t[0]] / scale_of_slip[0], b[t[1]] / scale_of_slip[1]])
+    free_gap = np.stack([b[t[0]] / scale_of_slip[0], b[t[1]] / scale_of_slip[1]])
     line = np.arange(len(chosen))
     for i in (0, 1):
         row = np.zeros((len(chosen), A.shape[1]))
-        right = np.zeros(len(chosen))
+        rhs = np.zeros(len(chosen))
         row[line, t[i]] += scale_of_slip[i]
-        row[line, pressed] -= mu * s[i] * scale[pressed]
+        row[line, column] -= mu * s[i] * scale[column]
         for j in (0, 1):
-            across = share * ((i == j) - s[i] * s[j])
-            row[line, t[j]] -= across * scale_of_slip[j]
-            row += (across * weight)[:, None] * slip[j]
-            right += across * weight * free[j]
+            projection = share * ((i == j) - s[i] * s[j])
+            row[line, t[j]] -= projection * scale_of_slip[j]
+            row += (projection * weight)[:, None] * slip[j]
+            rhs += projection * weight * free_gap[j]
         A[t[i]] = row / scale_of_slip[i][:, None]
-        b[t[i]] = right / scale_of_slip[i]
+        b[t[i]] = rhs / scale_of_slip[i]
 
 
 def _swept_cones(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Floats:
@@ -444,14 +450,14 @@ def _swept_cones(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Flo
             if j < 0:
                 continue
             rows_of_function = np.array([g + j, g + r + j])
-            stiff = float(np.linalg.eigvalsh(F[np.ix_(rows_of_function, rows_of_function)])[-1])
-            if stiff <= 0:
+            stiffness = float(np.linalg.eigvalsh(F[np.ix_(rows_of_function, rows_of_function)])[-1])
+            if stiffness <= 0:
                 continue
-            trial = lam[rows_of_function] - gap[rows_of_function] / stiff
+            trial = lam[rows_of_function] - gap[rows_of_function] / stiffness
             size, bound = float(np.hypot(*trial)), float(rows.mu[j]) * pressure
-            new = trial if size <= bound else trial * (bound / size)
-            gap += F[:, rows_of_function] @ (new - lam[rows_of_function])
-            lam[rows_of_function] = new
+            new_tractions = trial if size <= bound else trial * (bound / size)
+            gap += F[:, rows_of_function] @ (new_tractions - lam[rows_of_function])
+            lam[rows_of_function] = new_tractions
     return lam
 
 

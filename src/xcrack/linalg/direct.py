@@ -138,9 +138,11 @@ class DirectSystem:
         if f.ndim == 1:
             return self._displacements_of(self.apply_inverse(b), u_imposed)
         first, scale = proportional_columns(b)
-        alone = np.unique(first)
-        y = self.apply_inverse(b if len(alone) == b.shape[1] else b[:, alone])
-        return self._displacements_of(y[:, np.searchsorted(alone, first)] * scale, u_imposed)
+        distinct_columns = np.unique(first)
+        y = self.apply_inverse(b if len(distinct_columns) == b.shape[1] else b[:, distinct_columns])
+        return self._displacements_of(
+            y[:, np.searchsorted(distinct_columns, first)] * scale, u_imposed
+        )
 
     def first_look(
         self, f: Floats, u_imposed: Floats, closed_before: bool
@@ -168,10 +170,10 @@ class DirectSystem:
         del latest
         if self.factor is None:
             return self._contact_by_solves(rows, f, u_imposed, start, opened)
-        small = self.condense(rows.N, f, u_imposed)
-        states = self._sets(small.dual, small.gap, rows, start)
-        u = small.displacements(np.stack([state.pressure for state in states], axis=1))
-        return [replace(state, u=u[:, k], dual=small.dual) for k, state in enumerate(states)]
+        condensed = self.condense(rows.N, f, u_imposed)
+        states = self._sets(condensed.dual, condensed.gap, rows, start)
+        u = condensed.displacements(np.stack([state.pressure for state in states], axis=1))
+        return [replace(state, u=u[:, k], dual=condensed.dual) for k, state in enumerate(states)]
 
     def condense(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows see it; see `Engine`."""
@@ -189,11 +191,11 @@ class DirectSystem:
             d = N @ u_imposed + Y.T @ y[places]
 
         def displacements(lam: Floats) -> Floats:
-            loaded = y.copy()
+            total = y.copy()
             with one_blas_thread():
-                loaded[places] += Y @ lam
+                total[places] += Y @ lam
             self.count.solves += b.shape[1]
-            return self._displacements_of(factor.backward(loaded), u_imposed)
+            return self._displacements_of(factor.backward(total), u_imposed)
 
         return CondensedSystem(F, d, displacements)
 
@@ -227,10 +229,14 @@ class DirectSystem:
     def _sets(
         self, F: Floats, d: Floats, rows: ContactRows, start: Sequence[Bools | None]
     ) -> list[StateContact]:
-        unknown = np.full(len(rows.measure), rows.closed)
+        set_without_start = np.full(len(rows.measure), rows.closed)
         return [
             active_set(
-                F, d[:, k], rows.measure, rows.stiffness, unknown if first is None else first
+                F,
+                d[:, k],
+                rows.measure,
+                rows.stiffness,
+                set_without_start if first is None else first,
             )
             for k, first in enumerate(start)
         ]
@@ -256,7 +262,7 @@ class DirectSystem:
 def system(
     space: FunctionSpace,
     K: sp.csr_matrix,
-    fixed: Bools,
+    is_fixed: Bools,
     numerics: Numerics,
     solver: Solver | None = None,
     material: Material | None = None,
@@ -268,7 +274,7 @@ def system(
     ----------
     space : Space
     K : sparse matrix (n_dof, n_dof)
-    fixed : (n_dof,) array of bool
+    is_fixed : (n_dof,) array of bool
         Unknowns that supports decide, and pins.
     numerics : Numerics
     solver : callable, optional
@@ -278,23 +284,30 @@ def system(
     reuse : SolverState, optional
         Of an earlier solve. Where it is given, the next one may use this factor.
     """
-    basis, reduced = _reduced_columns(space, K, fixed, numerics, material)
+    basis, reduced_matrix = _reduced_columns(space, K, is_fixed, numerics, material)
     count = SolveCount(factorisations=1)
     if solver is not None:
         return DirectSystem(
-            K, ~fixed, basis, reduced, _verified_solver(solver, reduced), count=count
+            K,
+            ~is_fixed,
+            basis,
+            reduced_matrix,
+            _verified_solver(solver, reduced_matrix),
+            count=count,
         )
     halves = None if reuse is None else reuse.tree
     if halves is None or halves.mesh is not space.mesh or halves.order != space.order:
         halves = tree(space.mesh, space.order)
     support = basis.indptr, basis.indices, basis.shape[1], function_nodes(space), space.dim
-    before = None if reuse is None else reuse.factor
-    factor = factorise(reduced, support, halves, before, keep=reuse is not None)
+    previous_factor = None if reuse is None else reuse.factor
+    factor = factorise(reduced_matrix, support, halves, previous_factor, keep=reuse is not None)
     if factor is None:  # a pivot that is not positive: SuperLU needs none
-        return DirectSystem(K, ~fixed, basis, reduced, superlu(reduced), tree=halves, count=count)
-    inverse = _checked_solution(factor, reduced, count)
+        return DirectSystem(
+            K, ~is_fixed, basis, reduced_matrix, superlu(reduced_matrix), tree=halves, count=count
+        )
+    inverse = _checked_solution(factor, reduced_matrix, count)
     return DirectSystem(
-        K, ~fixed, basis, reduced, inverse, factor, halves, reuse is not None, count
+        K, ~is_fixed, basis, reduced_matrix, inverse, factor, halves, reuse is not None, count
     )
 
 
@@ -304,14 +317,14 @@ def _checked_solution(factor: Factor, A: sp.csc_matrix, count: SolveCount) -> So
     The first right-hand sides are all looked at; of later ones one is enough.
     """
     fallback: list[Solve] = []
-    sound: list[bool] = []
+    checks: list[bool] = []
 
     def solve(b: Floats) -> Floats:
         if not fallback:
             x = factor.solve(b)
-            some = slice(1) if sound and b.ndim > 1 else slice(None)
-            if _relative_residual(A, x[..., some], b[..., some]) <= _LOST:
-                sound.append(True)
+            columns = slice(1) if checks and b.ndim > 1 else slice(None)
+            if _relative_residual(A, x[..., columns], b[..., columns]) <= _LOST:
+                checks.append(True)
                 return x
             count.factorisations += 1
             fallback.append(superlu(A))
@@ -338,7 +351,10 @@ def _verified_solver(solver: Solver, A: sp.csc_matrix) -> Solve:
 
     def verified(b: Floats) -> Floats:
         x = numbers(
-            call_function(solve, "solver=", b), "what the solver returned", b.shape, finite=False
+            call_function(solve, "solver=", b),
+            "what the solver returned",
+            b.shape,
+            must_be_finite=False,
         )
         if not np.isfinite(x).all():
             return x  # a singular stiffness, which has its own error
@@ -361,7 +377,7 @@ def _verified_solver(solver: Solver, A: sp.csc_matrix) -> Solve:
 def scaled_basis(
     space: FunctionSpace,
     K: sp.csr_matrix,
-    fixed: Bools,
+    is_fixed: Bools,
     numerics: Numerics,
     material: Material | None = None,
 ) -> sp.csr_matrix:
@@ -369,13 +385,13 @@ def scaled_basis(
 
     The material counts for a tip basis that depends on it.
     """
-    return _reduced_columns(space, K, fixed, numerics, material)[0]
+    return _reduced_columns(space, K, is_fixed, numerics, material)[0]
 
 
 def _reduced_columns(
     space: FunctionSpace,
     K: sp.csr_matrix,
-    fixed: Bools,
+    is_fixed: Bools,
     numerics: Numerics,
     material: Material | None,
 ) -> tuple[sp.csr_matrix, sp.csc_matrix]:
@@ -387,22 +403,24 @@ def _reduced_columns(
     from xcrack.linalg.kernels.sparse import bordered_matrix
 
     first = space.n_nodes * space.dim
-    enriched = _enriched_columns(space, K, ~fixed, numerics, material)
+    tip_columns = _enriched_columns(space, K, ~is_fixed, numerics, material)
     while True:
-        across = K @ enriched
-        across.sort_indices()
-        down = across.T.tocsr()
-        enriched_part = down @ enriched
+        coupling = K @ tip_columns
+        coupling.sort_indices()
+        coupling_of_rows = coupling.T.tocsr()
+        enriched_part = coupling_of_rows @ tip_columns
         enriched_part.sort_indices()
         parts = (
             (each.indptr, each.indices, each.data)
-            for each in (enriched, across, down, enriched_part)
+            for each in (tip_columns, coupling, coupling_of_rows, enriched_part)
         )
-        matrix, columns, energy = bordered_matrix(K.indptr, K.indices, K.data, *parts, fixed, first)
-        alive = energy > 0
-        if alive.all():
+        matrix, columns, energy = bordered_matrix(
+            K.indptr, K.indices, K.data, *parts, is_fixed, first
+        )
+        has_energy = energy > 0
+        if has_energy.all():
             break
-        enriched = sp.csr_matrix(enriched[:, alive])
+        tip_columns = sp.csr_matrix(tip_columns[:, has_energy])
     size = len(matrix[0]) - 1
     basis = sp.csr_matrix((columns[2], columns[1], columns[0]), shape=(K.shape[0], size))
     return basis, sp.csc_matrix((matrix[2], matrix[1], matrix[0]), shape=(size, size))
@@ -411,28 +429,28 @@ def _reduced_columns(
 def _enriched_columns(
     space: FunctionSpace,
     K: sp.csr_matrix,
-    free: Bools,
+    is_free: Bools,
     numerics: Numerics,
     material: Material | None,
 ) -> sp.csr_matrix:
     """The columns of the solver's basis for enriched unknowns `(n_dof, k)`, not yet scaled."""
     n = space.n_dof
     first = space.n_nodes * space.dim
-    changed = None
+    change = None
     if numerics.tip_basis is not None and space.tips:
-        changed, free = numerics.tip_basis.columns(space, material, free)
-        K = sp.csr_matrix(changed.T @ K @ changed)
+        change, is_free = numerics.tip_basis.columns(space, material, is_free)
+        K = sp.csr_matrix(change.T @ K @ change)
     if numerics.patch and space.tips:
-        patch = patch_orthogonal(space, K, free)
-        changed = sp.csr_matrix(patch if changed is None else changed @ patch)
+        patch = patch_orthogonal(space, K, is_free)
+        change = sp.csr_matrix(patch if change is None else change @ patch)
         K = sp.csr_matrix(patch.T @ K @ patch)
     if numerics.orthonormal != "none" and n > first:
-        Z = orthonormal_functions(K, restricted(node_blocks(space, numerics.orthonormal), free))
+        Z = orthonormal_functions(K, restricted(node_blocks(space, numerics.orthonormal), is_free))
     else:
-        chosen = first + np.nonzero(free[first:])[0]
-        ones = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))
-        Z = sp.csr_matrix(ones, shape=(n, len(chosen)))
-    return Z if changed is None else sp.csr_matrix(changed @ Z)
+        chosen = first + np.nonzero(is_free[first:])[0]
+        unit_entries = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))
+        Z = sp.csr_matrix(unit_entries, shape=(n, len(chosen)))
+    return Z if change is None else sp.csr_matrix(change @ Z)
 
 
 __all__ = []

@@ -84,8 +84,8 @@ class SolverState:
 
     def was_closed(self, c: int) -> bool:
         """Whether any group of crack c was closed in any state."""
-        active = self.active[c] if c < len(self.active) else None
-        return active is not None and bool(active.any())
+        closed_sets = self.active[c] if c < len(self.active) else None
+        return closed_sets is not None and bool(closed_sets.any())
 
     def start(self, c: int, centre: Floats, state: int) -> Bools | None:
         """Closed set of the nearest multipliers `(g,)`, or None where nothing is known.
@@ -100,11 +100,11 @@ class SolverState:
         """
         if c >= len(self.centre):
             return None
-        before, active = self.centre[c], self.active[c]
-        if before is None or active is None or state >= len(active) or not len(before):
+        centres, closed_sets = self.centre[c], self.active[c]
+        if centres is None or closed_sets is None or state >= len(closed_sets) or not len(centres):
             return None
-        nearest = cKDTree(before).query(centre)[1]
-        return np.asarray(active[state][nearest])
+        nearest = cKDTree(centres).query(centre)[1]
+        return np.asarray(closed_sets[state][nearest])
 
 
 @dataclass

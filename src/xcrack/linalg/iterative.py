@@ -55,15 +55,15 @@ def enriched_basis(
     K: sp.csr_matrix,
     blocks: Blocks,
     levels: Hierarchy,
-    combined: sp.csr_matrix | None,
+    modes: sp.csr_matrix | None,
 ) -> tuple[sp.csc_matrix, Ints, Ints]:
     """Orthonormal enriched columns, node by node, the first column of each node, and their blocks.
 
     Their diagonal entries are made the mean one of the standard unknowns: the norm of a residual
     then weighs both alike.
     """
-    if combined is not None:
-        K = nearby_unknowns(K, combined, blocks)
+    if modes is not None:
+        K = nearby_unknowns(K, modes, blocks)
     Z = sp.csc_matrix(orthonormal_functions(K, blocks))
     owner = np.repeat(np.arange(len(blocks.n_standard)), np.diff(blocks.offsets))
     block_of = np.full(space.n_dof, -1, dtype=np.int64)
@@ -72,7 +72,7 @@ def enriched_basis(
     order = np.argsort(node, kind="stable")
     size = np.sqrt(levels.diagonal.mean())
     Z = sp.csc_matrix(Z[:, order] * size)
-    Z = Z if combined is None else sp.csc_matrix(combined @ Z)
+    Z = Z if modes is None else sp.csc_matrix(modes @ Z)
     node = node[order]
     starts = np.nonzero(np.concatenate([[True], node[1:] != node[:-1]]))[0] if len(node) else node
     return Z, starts, node
@@ -118,32 +118,34 @@ class Parts:
         n = len(self.body_unknowns)
         standard, enriched_numbers = chosen[chosen < n], chosen[chosen >= n] - n
         standard_entries = self.body_unknowns[standard]
-        across = self.coupling[standard][:, enriched_numbers]
+        coupling = self.coupling[standard][:, enriched_numbers]
         parts = [
-            [self.K[standard_entries][:, standard_entries], across],
-            [across.T, self.enriched_block[enriched_numbers][:, enriched_numbers]],
+            [self.K[standard_entries][:, standard_entries], coupling],
+            [coupling.T, self.enriched_block[enriched_numbers][:, enriched_numbers]],
         ]
         return sp.csr_matrix(sp.bmat(parts))
 
 
-def parts_of(levels: Hierarchy, K: sp.csr_matrix, plain: Ints, enriched: sp.csc_matrix) -> Parts:
+def parts_of(levels: Hierarchy, K: sp.csr_matrix, standard: Ints, basis: sp.csc_matrix) -> Parts:
     """Stiffness between the unknowns of a hierarchy and enriched columns."""
-    image = product(K, sp.csr_matrix(enriched))
-    enriched_block = product(sp.csr_matrix(enriched.T), image)
-    across = image[plain]
+    image = product(K, sp.csr_matrix(basis))
+    enriched_block = product(sp.csr_matrix(basis.T), image)
+    coupling = image[standard]
     if not levels.is_free.all():
-        across = sp.csr_matrix(sp.diags(levels.is_free.astype(float)) @ across)
-    return Parts(levels, K, plain, across, enriched_block)
+        coupling = sp.csr_matrix(sp.diags(levels.is_free.astype(float)) @ coupling)
+    return Parts(levels, K, standard, coupling, enriched_block)
 
 
-def nearby_unknowns(K: sp.csr_matrix, changed: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
+def nearby_unknowns(K: sp.csr_matrix, change: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
     """Stiffness in a changed basis: entries between the unknowns of blocks."""
     members = np.unique(blocks.members)
-    columns = sp.csc_matrix(changed[:, members])
+    columns = sp.csc_matrix(change[:, members])
     neighbours = np.unique(columns.indices)
     columns = columns[neighbours]
-    small = sp.coo_matrix(columns.T @ (K[neighbours][:, neighbours] @ columns))
-    return sp.csr_matrix((small.data, (members[small.row], members[small.col])), shape=K.shape)
+    entries = sp.coo_matrix(columns.T @ (K[neighbours][:, neighbours] @ columns))
+    return sp.csr_matrix(
+        (entries.data, (members[entries.row], members[entries.col])), shape=K.shape
+    )
 
 
 def within_blocks(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
@@ -221,19 +223,19 @@ class IterativeSystem:
             Residual relative to the load at which to stop.
         """
         columns = f.reshape(len(f), -1)
-        given = np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
-        b, known_of = _vectors(self._loads_on_unknowns(columns, given)), _vectors(given)
+        imposed = np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
+        b, known_of = _vectors(self._loads_on_unknowns(columns, imposed)), _vectors(imposed)
         y: list[Floats] = [np.zeros_like(each) for each in b]
         if start is not None:
-            y = _vectors(self.coordinates(start.reshape(columns.shape) - given))
+            y = _vectors(self.coordinates(start.reshape(columns.shape) - imposed))
         first = independent_columns(b)
-        remaining = [k for k in range(len(b)) if k not in first]
+        others = [k for k in range(len(b)) if k not in first]
         self._solve_apart(first, b, known_of, y, tolerance)
-        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in remaining])
-        for k, guess in zip(remaining, guesses, strict=True):
+        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in others])
+        for k, guess in zip(others, guesses, strict=True):
             y[k] = guess
-        self._solve_apart(remaining, b, known_of, y, tolerance)
-        return np.asarray(given + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
+        self._solve_apart(others, b, known_of, y, tolerance)
+        return np.asarray(imposed + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
 
     def first_look(
         self, f: Floats, u_imposed: Floats, closed_before: bool
@@ -266,37 +268,39 @@ class IterativeSystem:
             y = _vectors(self.coordinates(latest - u_imposed))
         # What a pressure closes, a multiple of the load closes too, and nothing else.
         right_hand_sides = np.concatenate([np.stack(b, axis=1), u_imposed])
-        like, scale = proportional_columns(right_hand_sides, _MULTIPLE)
-        solved: dict[int, ProjectedState] = {}
-        for chosen in _in_turn(like, scale):
+        row_alike, scale = proportional_columns(right_hand_sides, _MULTIPLE)
+        states: dict[int, ProjectedState] = {}
+        for chosen in _in_turn(row_alike, scale):
             runs = []
             for k in chosen:
-                model = solved.get(int(like[k]))
+                model = states.get(int(row_alike[k]))
                 first = start[k]
                 if model is not None:
                     y[k], first = scale[k] * model.y, model.active
-                active = rows_in_basis @ y[k] + gaps[k] < 0 if first is None else first
+                is_active = rows_in_basis @ y[k] + gaps[k] < 0 if first is None else first
                 conditions = rows_in_basis, gaps[k], rows.measure, rows.stiffness
-                runs.append(self._solve_with_rows(b[k], u_imposed[:, k], conditions, active, y[k]))
+                runs.append(
+                    self._solve_with_rows(b[k], u_imposed[:, k], conditions, is_active, y[k])
+                )
             for k, state in zip(chosen, in_lockstep(self.operator, runs), strict=True):
-                solved[k] = state
+                states[k] = state
                 self._count_steps(state.iterations)
         return [
             StateContact(s.pressure, s.gap, s.active, s.sets, u_imposed[:, k] + self.basis @ s.y)
-            for k, s in sorted(solved.items())
+            for k, s in sorted(states.items())
         ]
 
     def condense(self, N: sp.csr_matrix, f: Floats, u_imposed: Floats) -> CondensedSystem:
         """The system as rows see it; see `Engine`. A solve for each row."""
-        opened = self.solve(f, u_imposed)
+        without_contact = self.solve(f, u_imposed)
         F = np.empty((N.shape[0], N.shape[0]))
         for k in range(0, len(F), _COLUMNS):
-            some = N[k : k + _COLUMNS].toarray().T
-            F[:, k : k + _COLUMNS] = N @ self.solve(some, start=np.zeros_like(some))
+            loads = N[k : k + _COLUMNS].toarray().T
+            F[:, k : k + _COLUMNS] = N @ self.solve(loads, start=np.zeros_like(loads))
         return CondensedSystem(
             (F + F.T) / 2,
-            N @ opened,
-            lambda lam: self.solve(f + N.T @ lam, u_imposed, opened),
+            N @ without_contact,
+            lambda lam: self.solve(f + N.T @ lam, u_imposed, without_contact),
         )
 
     def handed_on(self, reuse: SolverState) -> SolverState:
@@ -317,8 +321,8 @@ class IterativeSystem:
     ) -> None:
         """Put solutions of some states in the place of their guesses."""
         runs = [self._solve_by_column(b[k], u_imposed[k], y[k], tolerance) for k in chosen]
-        for k, (solved, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
-            y[k] = solved
+        for k, (column, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+            y[k] = column
             self._count_steps(steps)
 
     def _count_steps(self, steps: int) -> None:
@@ -331,8 +335,10 @@ class IterativeSystem:
         y, steps = yield from conjugate_gradients_steps(self.operator, b, start, tolerance)
         share = self._share(y, b, u_imposed)
         if share < 1:
-            y, more = yield from conjugate_gradients_steps(self.operator, b, y, share * tolerance)
-            steps += more
+            y, further_steps = yield from conjugate_gradients_steps(
+                self.operator, b, y, share * tolerance
+            )
+            steps += further_steps
         return y, steps
 
     def _solve_with_rows(
@@ -340,18 +346,18 @@ class IterativeSystem:
         b: Floats,
         u_imposed: Floats,
         rows: tuple[sp.csr_matrix, Floats, Floats, float],
-        active: Bools,
+        is_active: Bools,
         y: Floats,
     ) -> Iteration[ProjectedState]:
-        state = yield from projected_steps(self.operator, b, *rows, active, y, TOLERANCE)
+        state = yield from projected_steps(self.operator, b, *rows, is_active, y, TOLERANCE)
         share = self._share(state.y, b, u_imposed)
         if share == 1:
             return state
-        more = yield from projected_steps(
+        further = yield from projected_steps(
             self.operator, b, *rows, state.active, state.y, share * TOLERANCE
         )
-        sets, steps = state.sets + more.sets - 1, state.iterations + more.iterations
-        return replace(more, sets=sets, iterations=steps)
+        sets, steps = state.sets + further.sets - 1, state.iterations + further.iterations
+        return replace(further, sets=sets, iterations=steps)
 
     def _share(self, y: Floats, b: Floats, u_imposed: Floats) -> float:
         """Size of the forces in the body relative to b.
@@ -372,9 +378,9 @@ class IterativeSystem:
         Known unknowns count as zero.
         """
         n = len(self.hierarchy.is_free)
-        enriched = self.basis[:, n:]
-        y = ((enriched.T @ (self._node_entries @ u)).T / self.operator.diagonal[n:]).T
-        return np.concatenate([self.basis[:, :n].T @ (u - enriched @ y), y])
+        enriched_columns = self.basis[:, n:]
+        y = ((enriched_columns.T @ (self._node_entries @ u)).T / self.operator.diagonal[n:]).T
+        return np.concatenate([self.basis[:, :n].T @ (u - enriched_columns @ y), y])
 
     @cached_property
     def _node_entries(self) -> sp.csr_matrix:
@@ -395,7 +401,7 @@ def iterative_system(
     space: FunctionSpace,
     K: sp.csr_matrix | Stiffness,
     bulk: Bulk,
-    fixed: Bools,
+    is_fixed: Bools,
     levels: Hierarchy | None = None,
     modes: Floats | None = None,
     tip_columns: Callable[[Bools], tuple[Any, Bools]] | None = None,
@@ -410,7 +416,7 @@ def iterative_system(
         Of all unknowns.
     bulk : Bulk
         Stiffness of the uncracked body, of which K's standard block is a copy.
-    fixed : (n_dof,) array of bool
+    is_fixed : (n_dof,) array of bool
         Unknowns that supports decide; no pins.
     levels : Hierarchy, optional
         Of an earlier crack in the same mesh; made anew where it does not fit.
@@ -421,69 +427,71 @@ def iterative_system(
     rows : (n_functions,) array of bool, optional
         Functions next to enriched ones, whose rows of a `Stiffness` are enough at order 1.
     """
-    if levels is None or not levels.fits(bulk, fixed):
-        levels = hierarchy(bulk, fixed)
+    if levels is None or not levels.fits(bulk, is_fixed):
+        levels = hierarchy(bulk, is_fixed)
     near_entries = _joined_rows(K, rows)  # after the levels, whose making needs the most memory
-    free = ~fixed
+    is_free = ~is_fixed
     d = space.dim
-    plain = np.arange(len(levels.is_free))
+    standard = np.arange(len(levels.is_free))
     stars = space.order == 2 and space.n_functions > space.n_nodes
-    combined, in_use, back = None, free, None
+    tip_modes, in_use, inverse = None, is_free, None
     if tip_columns is not None and space.tips:
-        combined, in_use = tip_columns(free)
+        tip_modes, in_use = tip_columns(is_free)
     if stars and space.tips:
-        combined, back = _star_orthogonal_basis(space, near_entries, combined, in_use)
+        tip_modes, inverse = _star_orthogonal_basis(space, near_entries, tip_modes, in_use)
     node_groups = node_blocks(space, "star" if stars else "node")
     blocks = restricted(node_groups, in_use)
-    enriched, starts, block = enriched_basis(space, near_entries, blocks, levels, combined)
-    parts = parts_of(levels, near_entries, plain, enriched)
-    stored, diagonal = parts.stored(starts), parts.diagonal
+    enriched_columns, starts, block = enriched_basis(space, near_entries, blocks, levels, tip_modes)
+    parts = parts_of(levels, near_entries, standard, enriched_columns)
+    border, diagonal = parts.stored(starts), parts.diagonal
     patches = None
     if stars and len(block):
-        home = np.where(levels.is_free, plain // d, -1)
+        home = np.where(levels.is_free, standard // d, -1)
         home = np.concatenate([home, node_groups.members[node_groups.offsets[block]] // d])
-        patches = star_patches(space, home, len(plain), diagonal, parts.entries)
-    within = within_blocks(near_entries, blocks) if combined is None else None
+        patches = star_patches(space, home, len(standard), diagonal, parts.entries)
+    block_entries = within_blocks(near_entries, blocks) if tip_modes is None else None
     del parts, near_entries  # before the cycle makes copies in single precision
     identity = sp.csr_matrix(
-        (levels.is_free.astype(float), (plain, np.arange(len(plain)))),
-        shape=(space.n_dof, len(plain)),
+        (levels.is_free.astype(float), (standard, np.arange(len(standard)))),
+        shape=(space.n_dof, len(standard)),
     )
-    basis = sp.csr_matrix(sp.hstack([identity, enriched]))
-    null = np.zeros((0, 0)) if modes is None else modes[: len(plain)]
+    basis = sp.csr_matrix(sp.hstack([identity, enriched_columns]))
+    null = np.zeros((0, 0)) if modes is None else modes[: len(standard)]
     if null.shape[1] and not levels.is_free.all():
         null = np.linalg.qr(null * levels.is_free[:, None])[0]
-    cycle = extended_cycle(levels, stored, diagonal, patches)
-    operator = Operator(stored.times, cycle, diagonal, null, stored.times_all, cycle.of_all)
-    return IterativeSystem(K, within, lock(free), basis, levels, operator, blocks, combined, back)
+    cycle = extended_cycle(levels, border, diagonal, patches)
+    operator = Operator(border.times, cycle, diagonal, null, border.times_all, cycle.of_all)
+    return IterativeSystem(
+        K, block_entries, lock(is_free), basis, levels, operator, blocks, tip_modes, inverse
+    )
 
 
 def _vectors(columns: Floats) -> list[Floats]:
     return list(np.ascontiguousarray(columns.T))
 
 
-def _in_turn(like: Ints, scale: Floats) -> Iterator[list[int]]:
+def _in_turn(row_alike: Ints, scale: Floats) -> Iterator[list[int]]:
     """States that are solved first, and positive multiples of theirs."""
-    multiple = (like != np.arange(len(like))) & (scale > 0)
-    multiple &= ~multiple[like]
+    multiple = (row_alike != np.arange(len(row_alike))) & (scale > 0)
+    multiple &= ~multiple[row_alike]
     yield [int(k) for k in np.nonzero(~multiple)[0]]
     yield [int(k) for k in np.nonzero(multiple)[0]]
 
 
 def _star_orthogonal_basis(
-    space: FunctionSpace, K: sp.csr_matrix, modes: sp.csr_matrix | None, free: Bools
+    space: FunctionSpace, K: sp.csr_matrix, modes: sp.csr_matrix | None, is_free: Bools
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Basis in which tip functions are orthogonal to the functions of their star; its inverse."""
     if modes is None:
-        apart = patch_orthogonal(space, K, free, "star")
+        projector = patch_orthogonal(space, K, is_free, "star")
         # What is taken off belongs to unknowns from which nothing is taken.
-        return apart, sp.csr_matrix(2 * sp.identity(space.n_dof) - apart)
-    apart = patch_orthogonal(space, sp.csr_matrix(modes.T @ K @ modes), free, "star")
+        return projector, sp.csr_matrix(2 * sp.identity(space.n_dof) - projector)
+    projector = patch_orthogonal(space, sp.csr_matrix(modes.T @ K @ modes), is_free, "star")
     # The modes of a point are orthogonal to each other: no two share a function of a component.
     size = np.asarray(modes.multiply(modes).sum(axis=0)).ravel()
     scaled_modes = sp.diags(1 / np.where(size > 0, size, 1.0)) @ modes.T
-    back = (2 * sp.identity(space.n_dof) - apart) @ scaled_modes
-    return sp.csr_matrix(modes @ apart), sp.csr_matrix(back)
+    inverse = (2 * sp.identity(space.n_dof) - projector) @ scaled_modes
+    return sp.csr_matrix(modes @ projector), sp.csr_matrix(inverse)
 
 
 # Load states that are nearly combinations of others.
@@ -506,11 +514,11 @@ def _norm(vector: Floats) -> float:
     return float(np.sqrt(np.einsum("i,i", vector, vector)))
 
 
-def best_guesses(K: Operator, solved: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
+def best_guesses(K: Operator, solutions: Sequence[Floats], b: Sequence[Floats]) -> list[Floats]:
     """Combinations of solutions with the least energy: exact for combinations of their loads."""
-    if not solved:
+    if not solutions:
         return [np.zeros_like(right_hand_side) for right_hand_side in b]
-    y = np.stack(solved, axis=1)
-    image = np.stack(K.answers(Request.TIMES, solved), axis=1)
+    y = np.stack(solutions, axis=1)
+    image = np.stack(K.answers(Request.TIMES, solutions), axis=1)
     inverse = np.linalg.pinv(y.T @ image, 1e-12, True)
     return [y @ (inverse @ (y.T @ right_hand_side)) for right_hand_side in b]

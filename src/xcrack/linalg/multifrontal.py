@@ -62,8 +62,8 @@ def tree(mesh: Mesh, order: int) -> Tree:
 
     centre = mesh.points[mesh.cells].mean(axis=1)
     depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
-    ranked = np.stack([np.argsort(x, kind="stable") for x in centre.T])
-    leaf = bisect_cells(ranked, centre, mesh.cells, mesh.n_points, depth)
+    ranking = np.stack([np.argsort(x, kind="stable") for x in centre.T])
+    leaf = bisect_cells(ranking, centre, mesh.cells, mesh.n_points, depth)
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     part = node_parts(nodes, leaf, depth, int(nodes.max()) + 1)
     parts, rank = postorder(depth)
@@ -136,10 +136,10 @@ class Factor:
         X = np.zeros((len(self.perm), B.shape[0]))
         X[place, np.arange(B.shape[0]).repeat(np.diff(B.indptr))] = B.data
         part = np.repeat(np.arange(len(self.first_unknown) - 1), np.diff(self.first_unknown))
-        touched = np.zeros(len(self.first_unknown) - 1, dtype=bool)
-        touched[part[place]] = True
-        self._halves(X, True, False, touched)
-        rows = np.nonzero(touched[part])[0]
+        is_touched = np.zeros(len(self.first_unknown) - 1, dtype=bool)
+        is_touched[part[place]] = True
+        self._halves(X, True, False, is_touched)
+        rows = np.nonzero(is_touched[part])[0]
         return X[rows], rows
 
     def backward(self, y: Floats) -> Floats:
@@ -155,11 +155,11 @@ class Factor:
         return x.reshape(shape)
 
     def _halves(
-        self, X: Floats, forward: bool, backward: bool, touched: Bools | None = None
+        self, X: Floats, is_forward: bool, is_backward: bool, is_touched: Bools | None = None
     ) -> Floats:
         from xcrack.linalg.kernels.multifrontal import substitute, substituted_one
 
-        if X.shape[1] <= _FEW and touched is None:
+        if X.shape[1] <= _FEW and is_touched is None:
             columns = np.ascontiguousarray(X.T)
             with one_blas_thread():
                 for x in columns:
@@ -169,17 +169,17 @@ class Factor:
                         self.boundary,
                         self.panel,
                         x,
-                        forward,
-                        backward,
+                        is_forward,
+                        is_backward,
                     )
             return np.ascontiguousarray(columns.T)
-        if touched is None:
-            touched = np.ones(len(self.first_unknown) - 1, dtype=bool)
+        if is_touched is None:
+            is_touched = np.ones(len(self.first_unknown) - 1, dtype=bool)
         tree = self.tree
         with one_blas_thread():
             substitute(
                 self.first_unknown, self.begin, self.boundary, tree.postorder, tree.rank,
-                self.panel, X, touched, forward, backward,
+                self.panel, X, is_touched, is_forward, is_backward,
             )  # fmt: skip
         return X
 
@@ -188,7 +188,7 @@ def factorise(
     A: sp.csc_matrix,
     columns: tuple[Ints, Ints, int, Ints, int],
     tree: Tree,
-    before: Factor | None = None,
+    previous: Factor | None = None,
     keep: bool = False,
 ) -> Factor | None:
     """Factor a symmetric matrix; None where it is not positive definite.
@@ -201,7 +201,7 @@ def factorise(
         Rows of the basis that A belongs to, CSR, and its number of columns; the node of each
         function, and the number of components.
     tree : Tree
-    before : Factor, optional
+    previous : Factor, optional
         Of an earlier crack on the same tree, made to be kept.
     keep : bool
         Keep what the next factorisation may take over.
@@ -229,43 +229,44 @@ def factorise(
     height = heights(order, rank)
     depth = int(height[-1])
     # Update matrices of parts with that many levels below are kept for the next factorisation.
-    lowest = min(_UNIT, depth)
-    while lowest <= depth and update_size[height >= lowest].sum() > _MOST:
-        lowest += 1
-    level = min(max(depth - _SHARED, lowest), depth)
-    is_packed = (height >= lowest) | (height == level) if keep else height == level
+    lowest_height = min(_UNIT, depth)
+    while lowest_height <= depth and update_size[height >= lowest_height].sum() > _MOST:
+        lowest_height += 1
+    level = min(max(depth - _SHARED, lowest_height), depth)
+    is_packed = (height >= lowest_height) | (height == level) if keep else height == level
     place, *stacks = places_of_squares(order, rank, begin, height, is_packed, level)
     own_size = np.where(is_packed, update_size, 0)
-    used = int(panel_size.sum() + (own_size.sum() if keep else 0))
+    memory_in_use = int(panel_size.sum() + (own_size.sum() if keep else 0))
     chosen_parts = np.ones(len(order), dtype=bool)
-    earlier: tuple[Floats, ...] = ()
+    previous_memory: tuple[Floats, ...] = ()
     if (
         keep
-        and before is not None
-        and before.tree is tree
-        and before.subtree_levels == lowest <= depth
+        and previous is not None
+        and previous.tree is tree
+        and previous.subtree_levels == lowest_height <= depth
     ):
         chosen_parts = _parts_to_factor(
-            ~unchanged_parts(fronts, before.fronts), order, rank, height, lowest
+            ~unchanged_parts(fronts, previous.fronts), order, rank, height, lowest_height
         )
-        earlier = before.memory
+        previous_memory = previous.memory
     panels, panel = _room(np.where(chosen_parts, panel_size, 0))
     updates, update = _room(np.where(chosen_parts, own_size, 0))
-    if earlier and before is not None:
-        panel = np.where(chosen_parts, panel, before.panel)
-        update = np.where(chosen_parts, update, before.update)
+    if previous_memory and previous is not None:
+        panel = np.where(chosen_parts, panel, previous.panel)
+        update = np.where(chosen_parts, update, previous.update)
     if _factor_subtrees(
         fronts, panel, update, (place, is_packed, height, chosen_parts), stacks, level
     ):
         return None
-    memory = (*earlier, lock(panels), lock(updates)) if keep else (lock(panels),)
-    if sum(len(part) for part in memory) > _SPREAD * used:
+    memory = (*previous_memory, lock(panels), lock(updates)) if keep else (lock(panels),)
+    if sum(len(part) for part in memory) > _SPREAD * memory_in_use:
         panels, panel = _gather_numbers(panel, panel_size)
         updates, update = _gather_numbers(update, own_size)
         memory = (lock(panels), lock(updates))
     return Factor(
         tree, lock(perm), lock(first), lock(begin), lock(boundary), lock(in_parent), lock(start),
-        lock(row), lock(value), lock(panel), lock(update), memory, used, lowest if keep else -1,
+        lock(row), lock(value), lock(panel), lock(update), memory, memory_in_use,
+        lowest_height if keep else -1,
     )  # fmt: skip
 
 
@@ -286,7 +287,7 @@ def _factor_subtrees(
 
     place, is_packed, height, chosen_parts = parts
     square = np.zeros(len(place), dtype=np.uint64)
-    spare: list[Floats] = []
+    free_rooms: list[Floats] = []
 
     def factor(chosen: Bools, begin: int, end: int, room: Floats) -> int:
         square[begin:end] = np.where(
@@ -298,18 +299,18 @@ def _factor_subtrees(
         begin, end = root + 2 - (2 << level), root + 1
         if not chosen_parts[begin:end].any():
             return 0
-        room = spare.pop() if spare else np.empty(stacks[0])
-        failed = factor(chosen_parts, begin, end, room)
-        spare.append(room)
-        return failed
+        room = free_rooms.pop() if free_rooms else np.empty(stacks[0])
+        has_failed = factor(chosen_parts, begin, end, room)
+        free_rooms.append(room)
+        return has_failed
 
     with one_blas_thread():
         roots = np.nonzero(height == level)[0].tolist()
-        few = len(fronts[5]) < _LEAST
-        if any(map(subtree, roots) if few else map_tasks(subtree, roots)):
+        has_few_parts = len(fronts[5]) < _LEAST
+        if any(map(subtree, roots) if has_few_parts else map_tasks(subtree, roots)):
             return True
-        above = chosen_parts & (height > level)
-        return bool(above.any() and factor(above, 0, len(height), np.empty(stacks[1])))
+        is_above = chosen_parts & (height > level)
+        return bool(is_above.any() and factor(is_above, 0, len(height), np.empty(stacks[1])))
 
 
 def _room(size: Ints) -> tuple[Floats, Any]:
@@ -319,24 +320,26 @@ def _room(size: Ints) -> tuple[Floats, Any]:
     return numbers, np.uint64(numbers.ctypes.data) + np.uint64(8) * begin
 
 
-def _gather_numbers(old: Ints, size: Ints) -> tuple[Floats, Any]:
+def _gather_numbers(old_memory: Ints, size: Ints) -> tuple[Floats, Any]:
     """The numbers of all parts copied into one array, and their addresses."""
     from xcrack.linalg.kernels.multifrontal import copy_stretches
 
-    numbers, new = _room(size)
-    copy_stretches(old, new, size)
-    return numbers, new
+    numbers, new_memory = _room(size)
+    copy_stretches(old_memory, new_memory, size)
+    return numbers, new_memory
 
 
-def _parts_to_factor(changed: Bools, order: Ints, rank: Ints, height: Ints, lowest: int) -> Bools:
+def _parts_to_factor(
+    is_changed: Bools, order: Ints, rank: Ints, height: Ints, lowest_height: int
+) -> Bools:
     """Parts to factor again: those that changed, their ancestors, and whole units of them."""
-    chosen_parts = np.array(changed)
+    chosen_parts = np.array(is_changed)
     p = order[np.nonzero(chosen_parts)[0]]
     while len(p):
         chosen_parts[rank[p]] = True
         p = np.unique(p[p > 1] >> 1)
     # A unit's root stands for all of it.
-    above = order.copy()
-    low = height < lowest
-    steps = np.where(low, lowest - height, 0)
-    return np.asarray(chosen_parts[rank[above >> steps]])
+    ancestors = order.copy()
+    low = height < lowest_height
+    steps = np.where(low, lowest_height - height, 0)
+    return np.asarray(chosen_parts[rank[ancestors >> steps]])

@@ -74,9 +74,9 @@ class Patches:
         """Sum of the solutions of all blocks, and of the unknowns outside, in single precision."""
         from xcrack.linalg.kernels.sparse import add_solved
 
-        out = self.inverse_diagonal * r
-        add_solved(self.members, self.start, self.offset, self.inverse, r, out)
-        return out
+        result = self.inverse_diagonal * r
+        add_solved(self.members, self.start, self.offset, self.inverse, r, result)
+        return result
 
 
 def star_patches(
@@ -101,20 +101,20 @@ def star_patches(
         Sorted unknowns (m,) -> their entries of the matrix (m, m).
     """
     members, start = _members(space, home, n_standard)
-    used, place = np.unique(members, return_inverse=True)
-    inverse, offset = _inverses(matrix_entries(used), place, start)
-    alone = (1 / diagonal).astype(np.float32)
-    alone[used] = 0
-    short = [each.astype(np.uint32) for each in (members, start)]
-    return Patches(*map(lock, (*short, offset, inverse, alone)))
+    members_in_use, place = np.unique(members, return_inverse=True)
+    inverse, offset = _inverses(matrix_entries(members_in_use), place, start)
+    inverse_of_others = (1 / diagonal).astype(np.float32)
+    inverse_of_others[members_in_use] = 0
+    short_arrays = [each.astype(np.uint32) for each in (members, start)]
+    return Patches(*map(lock, (*short_arrays, offset, inverse, inverse_of_others)))
 
 
 def _members(space: FunctionSpace, home: Ints, n_standard: int) -> tuple[Ints, Ints]:
     """Unknowns of each star, one star after the other, and where each begins."""
     n = space.mesh.n_points
-    enriched = np.unique(home[n_standard:])
-    ends = space.mesh.edges[enriched[enriched >= n] - n].ravel()
-    points = np.unique(np.concatenate([enriched[enriched < n], ends]))
+    nodes = np.unique(home[n_standard:])
+    ends = space.mesh.edges[nodes[nodes >= n] - n].ravel()
+    points = np.unique(np.concatenate([nodes[nodes < n], ends]))
     nodes_with_home = np.nonzero(home >= 0)[0]
     at = sp.csr_matrix(
         (np.ones(len(nodes_with_home), np.int8), (home[nodes_with_home], nodes_with_home)),
@@ -132,10 +132,10 @@ def _inverses(A: sp.csr_matrix, members: Ints, start: Ints) -> tuple[Any, Any]:
     size = np.diff(start)
     offset = offsets(size**2)
     result = np.empty(offset[-1], np.float32)
-    flat = dense_blocks(A.indptr, A.indices, A.data, members, start)
+    blocks_in_row = dense_blocks(A.indptr, A.indices, A.data, members, start)
     for s in np.unique(size):
         where = offset[:-1][size == s][:, None] + np.arange(s * s)
-        inverse = _stable_inverses(flat[where].reshape(-1, s, s))
+        inverse = _stable_inverses(blocks_in_row[where].reshape(-1, s, s))
         result[where] = inverse.reshape(-1, s * s)
     return result, offset[:-1].astype(np.uint64)
 
@@ -143,9 +143,9 @@ def _inverses(A: sp.csr_matrix, members: Ints, start: Ints) -> tuple[Any, Any]:
 def _stable_inverses(A: Floats) -> Floats:
     """Inverses of positive matrices (b, s, s); eigenvalues that hardly count are lifted."""
     root = 1 / np.sqrt(np.einsum("bii->bi", A))
-    scaled = root[:, :, None] * A * root[:, None, :]
+    scaled_blocks = root[:, :, None] * A * root[:, None, :]
     try:
-        L = np.linalg.cholesky(scaled)
+        L = np.linalg.cholesky(scaled_blocks)
         if np.einsum("bii->bi", L).min() ** 2 > _RESOLVED:
             inverse = np.linalg.inv(L)
             return np.asarray(
@@ -153,7 +153,7 @@ def _stable_inverses(A: Floats) -> Floats:
             )
     except np.linalg.LinAlgError:
         pass
-    w, V = np.linalg.eigh(scaled)
+    w, V = np.linalg.eigh(scaled_blocks)
     V = root[:, :, None] * V
     w = np.maximum(w, _RESOLVED * w[:, -1:])
     return np.asarray((V / w[:, None, :]) @ V.transpose(0, 2, 1))
@@ -219,11 +219,11 @@ class VCycle:
         """Approximate A^-1 r of several vectors, four at a time."""
         sizes = [float(np.abs(r).max(initial=0.0)) for r in residuals]
         sizes = [size if np.isfinite(size) else 0.0 for size in sizes]
-        scaled = [
+        scaled_residuals = [
             (r / size if size > 0 else np.zeros_like(r)).astype(np.float32)
             for r, size in zip(residuals, sizes, strict=True)
         ]
-        results = in_fours(partial(self._solve_below, 0), scaled)
+        results = in_fours(partial(self._solve_below, 0), scaled_residuals)
         return [z.astype(np.float64) * size for z, size in zip(results, sizes, strict=True)]
 
     def _solve_below(self, number: int, b: Any) -> Any:
@@ -234,9 +234,9 @@ class VCycle:
         d = _smooth(level, r, x)
         level.matrix.added(r, -1, d)
         n = level.prolong.shape[0]
-        coarse = self._solve_below(number + 1, level.restrict.times(r[:n]))
+        coarse_correction = self._solve_below(number + 1, level.restrict.times(r[:n]))
         correction = np.zeros_like(x)
-        level.prolong.added(correction[:n], 1, coarse)
+        level.prolong.added(correction[:n], 1, coarse_correction)
         x += correction
         level.matrix.added(r, -1, correction)
         _smooth(level, r, x)
@@ -258,19 +258,19 @@ def _smooth(level: GridLevel, r: Any, x: Any) -> Any:
     middle, half = (high + low) / 2, (high - low) / 2
     sigma = middle / half
     rho = 1 / (2 * sigma - 1 / sigma)
-    single = np.float32
+    dtype = np.float32
     d = np.empty_like(x)
     inverse = level.inverse_diagonal if r.ndim == 1 else level.inverse_of_four
-    first_step(inverse, level.solved(r).ravel(), single(1 / middle), d.ravel(), x.ravel())
+    first_step(inverse, level.solved(r).ravel(), dtype(1 / middle), d.ravel(), x.ravel())
     level.matrix.added(r, -1, d)
-    scale = single(2 * rho / half)
-    after = level.solved(r).ravel()
-    next_step(inverse, after, single(rho / sigma), scale, d.ravel(), x.ravel())
+    scale = dtype(2 * rho / half)
+    smoothed_residual = level.solved(r).ravel()
+    next_step(inverse, smoothed_residual, dtype(rho / sigma), scale, d.ravel(), x.ravel())
     return d
 
 
 def largest_eigenvalue(
-    A: RowBlocks | BorderedFactor, diagonal: Floats, solved: Callable[[Any], Any] | None = None
+    A: RowBlocks | BorderedFactor, diagonal: Floats, smoother: Callable[[Any], Any] | None = None
 ) -> float:
     """Upper bound of the spectrum of B A, from a few steps of Lanczos.
 
@@ -280,13 +280,13 @@ def largest_eigenvalue(
     ----------
     A : RowBlocks or BorderedFactor
     diagonal : (n,) array
-    solved : callable, optional
+    smoother : callable, optional
         B r of a residual r in single precision; without it B is the inverse diagonal.
     """
     inverse = reciprocal(diagonal)
 
     def image(w: Floats) -> Floats:
-        z = inverse * w if solved is None else solved(w.astype(np.float32))
+        z = inverse * w if smoother is None else smoother(w.astype(np.float32))
         return np.asarray(z, dtype=float)
 
     w = np.sqrt(np.maximum(diagonal, 0.0)) * np.random.default_rng(_START).standard_normal(
@@ -294,16 +294,16 @@ def largest_eigenvalue(
     )
     if A.idle_rows is not None:
         w[A.idle_rows] = 0.0
-    z, before = image(w), np.zeros_like(w)
+    z, previous_vector = image(w), np.zeros_like(w)
     beta = float(np.sqrt(np.einsum("i,i", w, z)))
     alphas: list[float] = []
     betas: list[float] = []
     for _ in range(_LANCZOS):
         q, p = w / beta, z / beta
-        w = A.times(p.astype(A.dtype)) - beta * before
+        w = A.times(p.astype(A.dtype)) - beta * previous_vector
         alphas.append(float(np.einsum("i,i", w, p)))
         w -= alphas[-1] * q
-        z, before = image(w), q
+        z, previous_vector = image(w), q
         beta = float(np.sqrt(max(np.einsum("i,i", w, z), 0.0)))
         if beta <= 1e-6 * abs(alphas[-1]):
             break
@@ -315,8 +315,8 @@ def largest_eigenvalue(
 
 def reciprocal(diagonal: Floats) -> Floats:
     """1 / diagonal, 0 where an aggregate was too small for all motions."""
-    alive = diagonal > 1e-12 * diagonal.max(initial=0.0)
-    return np.where(alive, 1 / np.where(alive, diagonal, 1.0), 0.0)
+    has_stiffness = diagonal > 1e-12 * diagonal.max(initial=0.0)
+    return np.where(has_stiffness, 1 / np.where(has_stiffness, diagonal, 1.0), 0.0)
 
 
 # The levels.
@@ -350,47 +350,47 @@ class Hierarchy:
     levels: tuple[GridLevel, ...]
     coarse_inverse: Any
 
-    def fits(self, bulk: Bulk, fixed: Bools) -> bool:
+    def fits(self, bulk: Bulk, is_fixed: Bools) -> bool:
         """Whether the hierarchy is that of a stiffness and its supports."""
         n = len(self.is_fixed)
-        return self.bulk.matrix is bulk.matrix and np.array_equal(self.is_fixed, fixed[:n])
+        return self.bulk.matrix is bulk.matrix and np.array_equal(self.is_fixed, is_fixed[:n])
 
 
-def hierarchy(bulk: Bulk, fixed: Bools) -> Hierarchy:
+def hierarchy(bulk: Bulk, is_fixed: Bools) -> Hierarchy:
     """Make the levels of the uncracked body by smoothed aggregation with its rigid motions.
 
     Parameters
     ----------
     bulk : Bulk
-    fixed : (n,) array of bool
+    is_fixed : (n,) array of bool
         Unknowns that supports decide; entries behind the standard unknowns are not looked at.
         An unsupported body is allowed: its motions are left out on the coarsest level.
     """
     A, d = bulk.matrix, bulk.mesh.dim
-    fixed = np.array(fixed[: A.shape[0]], dtype=bool)
-    free, diagonal = ~fixed, _diagonal(A)
-    finest = store_blocks(A, np.float64)
-    if fixed.any():
-        finest = replace(finest, idle_rows=lock(np.nonzero(fixed)[0]))
+    is_fixed = np.array(is_fixed[: A.shape[0]], dtype=bool)
+    is_free, diagonal = ~is_fixed, _diagonal(A)
+    finest_blocks = store_blocks(A, np.float64)
+    if is_fixed.any():
+        finest_blocks = replace(finest_blocks, idle_rows=lock(np.nonzero(is_fixed)[0]))
     if bulk.order == 2:
-        levels, coarsest = _over_linear(bulk, fixed, finest, diagonal)
+        levels, coarsest_inverse = _over_linear(bulk, is_fixed, finest_blocks, diagonal)
     else:
-        motions = rigid_modes(node_points(bulk.mesh, bulk.order)) * free[:, None]
-        alone = np.asarray(fixed.reshape(-1, d).all(axis=1))
-        levels, coarsest = _aggregation_levels(A, finest, motions, alone)
+        motions = rigid_modes(node_points(bulk.mesh, bulk.order)) * is_free[:, None]
+        is_fixed_node = np.asarray(is_fixed.reshape(-1, d).all(axis=1))
+        levels, coarsest_inverse = _aggregation_levels(A, finest_blocks, motions, is_fixed_node)
     return Hierarchy(
         bulk=bulk,
-        is_fixed=lock(fixed),
-        is_free=lock(free),
-        matrix=finest,
+        is_fixed=lock(is_fixed),
+        is_free=lock(is_free),
+        matrix=finest_blocks,
         diagonal=lock(diagonal),
         levels=levels,
-        coarse_inverse=coarsest,
+        coarse_inverse=coarsest_inverse,
     )
 
 
 def _aggregation_levels(
-    A: sp.bsr_matrix, finest: RowBlocks, candidates: Floats, alone: Bools
+    A: sp.bsr_matrix, finest_blocks: RowBlocks, candidates: Floats, is_fixed_node: Bools
 ) -> tuple[tuple[GridLevel, ...], Floats]:
     """Levels of smoothed aggregation, and the inverse on the coarsest.
 
@@ -398,16 +398,18 @@ def _aggregation_levels(
     """
     levels: list[GridLevel] = []
     while A.shape[0] > _COARSEST or not levels:
-        blocks = store_blocks(A) if levels else finest.single()
+        blocks = store_blocks(A) if levels else finest_blocks.single()
         diagonal = _diagonal(A)
         largest = largest_eigenvalue(blocks, diagonal)
-        P, candidates = _prolongator(A, diagonal, largest, candidates, alone, blocks.idle_rows)
+        P, candidates = _prolongator(
+            A, diagonal, largest, candidates, is_fixed_node, blocks.idle_rows
+        )
         scale = float(diagonal.max())
-        A, small = _coarse_matrix(A, P), sp.bsr_matrix(P, dtype=np.float32)
-        alone = np.zeros(len(A.indptr) - 1, dtype=bool)
+        A, prolongation = _coarse_matrix(A, P), sp.bsr_matrix(P, dtype=np.float32)
+        is_fixed_node = np.zeros(len(A.indptr) - 1, dtype=bool)
         del P
-        levels.append(_level(blocks, diagonal, largest, small))
-        if A.shape[0] > 0.7 * small.shape[0]:
+        levels.append(_level(blocks, diagonal, largest, prolongation))
+        if A.shape[0] > 0.7 * prolongation.shape[0]:
             break
     return tuple(levels), _pseudo_inverse(A.toarray(), scale)
 
@@ -435,17 +437,19 @@ def _rows(A: sp.bsr_matrix, first: int) -> sp.bsr_matrix:
 
 
 def _over_linear(
-    bulk_: Bulk, fixed: Bools, finest: RowBlocks, diagonal: Floats
+    bulk_: Bulk, is_fixed: Bools, finest_blocks: RowBlocks, diagonal: Floats
 ) -> tuple[tuple[GridLevel, ...], Floats]:
     """Quadratic functions over the levels of the linear ones, which they contain."""
     mesh, d = bulk_.mesh, bulk_.mesh.dim
-    lower = hierarchy(bulk(bulk_.elasticity, 1), fixed)
+    lower = hierarchy(bulk(bulk_.elasticity, 1), is_fixed)
     half = 0.5 * stars(mesh, 2)
     half.setdiag(1.0)
     P = sp.kron(half.T.tocsr(), sp.identity(d))
-    P = sp.bsr_matrix(sp.diags(~fixed * 1.0) @ P @ sp.diags(lower.is_free * 1.0), blocksize=(d, d))
-    single = finest.single()
-    top = _level(single, diagonal, largest_eigenvalue(single, diagonal), P)
+    P = sp.bsr_matrix(
+        sp.diags(~is_fixed * 1.0) @ P @ sp.diags(lower.is_free * 1.0), blocksize=(d, d)
+    )
+    single_blocks = finest_blocks.single()
+    top = _level(single_blocks, diagonal, largest_eigenvalue(single_blocks, diagonal), P)
     return (top, *lower.levels), lower.coarse_inverse
 
 
@@ -463,16 +467,18 @@ def extended_cycle(
     patches : Patches, optional
         Blocks that smooth in the place of the diagonal.
     """
-    finest = levels.levels[0]
-    standard = cast(RowBlocks, finest.matrix)
-    single = BorderedFactor(standard, A.coupling.single(), A.border_rows.single())
+    finest_level = levels.levels[0]
+    standard = cast(RowBlocks, finest_level.matrix)
+    single_factor = BorderedFactor(standard, A.coupling.single(), A.border_rows.single())
     if patches is None:
         inverse = reciprocal(diagonal).astype(np.float32)
-        largest = largest_eigenvalue(single, diagonal)
+        largest = largest_eigenvalue(single_factor, diagonal)
     else:
         inverse = np.ones(len(diagonal), np.float32)
-        largest = largest_eigenvalue(single, diagonal, patches.times)
-    top = GridLevel(single, lock(inverse), largest, finest.prolong, finest.restrict, patches)
+        largest = largest_eigenvalue(single_factor, diagonal, patches.times)
+    top = GridLevel(
+        single_factor, lock(inverse), largest, finest_level.prolong, finest_level.restrict, patches
+    )
     return VCycle((top, *levels.levels[1:]), levels.coarse_inverse)
 
 
@@ -496,36 +502,38 @@ def _prolongator(
     diagonal: Floats,
     largest: float,
     candidates: Floats,
-    alone: Bools,
-    idle: Ints | None,
+    is_fixed_node: Bools,
+    idle_rows: Ints | None,
 ) -> tuple[sp.bsr_matrix, Floats]:
     """Aggregates whose motions are smoothed once, and the motions of the next level."""
-    instead = 'Numerics(linear="direct") does without it.'
-    aggregation = require_package("pyamg.aggregation", "a large 3D body", instead)
-    n, size = len(alone), A.blocksize[0]
-    ones = np.ones(len(A.indices), np.int8)
-    graph = sp.csr_matrix((ones, A.indices, A.indptr), shape=(n, n))
-    nodes = np.nonzero(~alone)[0]
+    remedy = 'Numerics(linear="direct") does without it.'
+    aggregation = require_package("pyamg.aggregation", "a large 3D body", remedy)
+    n, size = len(is_fixed_node), A.blocksize[0]
+    unit_entries = np.ones(len(A.indices), np.int8)
+    graph = sp.csr_matrix((unit_entries, A.indices, A.indptr), shape=(n, n))
+    nodes = np.nonzero(~is_fixed_node)[0]
     if len(nodes) < n:
         graph = graph[nodes][:, nodes]
     motions = candidates.reshape(n, size, -1)[nodes].reshape(-1, candidates.shape[1])
-    T, coarse = aggregation.fit_candidates(aggregation.standard_aggregation(graph)[0], motions)
+    T, coarse_motions = aggregation.fit_candidates(
+        aggregation.standard_aggregation(graph)[0], motions
+    )
     count = np.zeros(n, dtype=np.int64)
     count[nodes] = np.diff(sp.bsr_matrix(T).indptr)
     T = sp.bsr_matrix((T.data, T.indices, offsets(count)), shape=(len(diagonal), T.shape[1]))
     factor = _OMEGA * SAFETY / largest * reciprocal(diagonal)
-    if idle is not None:
-        factor[idle] = 0.0
-    damped = factor.reshape(n, -1)
+    if idle_rows is not None:
+        factor[idle_rows] = 0.0
+    damped_factor = factor.reshape(n, -1)
 
     def smoothed(first: int) -> sp.bsr_matrix:
         image = _rows(A, first) @ T
-        damped_rows = damped[first : first + _ROWS]
+        damped_rows = damped_factor[first : first + _ROWS]
         image.data *= np.repeat(damped_rows, np.diff(image.indptr), axis=0)[:, :, None]
         return _rows(T, first) - image
 
     # Of all rows at once the image takes more memory than the result.
-    return _stacked_rows(list(stream_tasks(smoothed, range(0, n, _ROWS)))), coarse
+    return _stacked_rows(list(stream_tasks(smoothed, range(0, n, _ROWS)))), coarse_motions
 
 
 def _stacked_rows(parts: list[sp.bsr_matrix]) -> sp.bsr_matrix:
@@ -546,6 +554,6 @@ def _pseudo_inverse(A: Floats, scale: float) -> Any:
     diagonal = np.diag(A)
     root = np.sqrt(np.where(diagonal > _NULL * scale, reciprocal(diagonal), 0.0))
     w, V = np.linalg.eigh(root[:, None] * A * root)
-    significant = w > _NULL * max(w[-1], _NULL)
-    V = root[:, None] * V[:, significant]
-    return lock(((V / w[significant]) @ V.T).astype(np.float32))
+    is_significant = w > _NULL * max(w[-1], _NULL)
+    V = root[:, None] * V[:, is_significant]
+    return lock(((V / w[is_significant]) @ V.T).astype(np.float32))

@@ -88,15 +88,15 @@ def in_fours(function: Callable[[Any], Any], vectors: Sequence[Any]) -> list[Any
     """
     results: list[Any] = []
     for first in range(0, len(vectors), _FOUR):
-        some = vectors[first : first + _FOUR]
-        if len(some) == 1:
-            results.append(function(some[0]))
+        group = vectors[first : first + _FOUR]
+        if len(group) == 1:
+            results.append(function(group[0]))
             continue
-        columns = np.zeros((len(some[0]), _FOUR), some[0].dtype)
-        for k, vector in enumerate(some):
+        columns = np.zeros((len(group[0]), _FOUR), group[0].dtype)
+        for k, vector in enumerate(group):
             columns[:, k] = vector
         columns = function(columns)
-        results += [np.ascontiguousarray(columns[:, k]) for k in range(len(some))]
+        results += [np.ascontiguousarray(columns[:, k]) for k in range(len(group))]
     return results
 
 
@@ -139,7 +139,7 @@ class RowBlocks:
         else:
             from xcrack.linalg.kernels.cycle import product_of_four as multiply
         number = self.dtype.type(scale)
-        unchanged = None if self.idle_rows is None else y[self.idle_rows]
+        idle_values = None if self.idle_rows is None else y[self.idle_rows]
 
         def rows(stretch: slice) -> None:
             multiply(
@@ -150,8 +150,8 @@ class RowBlocks:
         entries = len(self.values) * (1 if x.ndim == 1 else 2)
         count = min(number_of_threads(), entries // _LEAST)
         map_tasks(rows, self._stretches(count))
-        if unchanged is not None:
-            y[self.idle_rows] = unchanged
+        if idle_values is not None:
+            y[self.idle_rows] = idle_values
         return y
 
     def _stretches(self, count: int) -> list[slice]:
@@ -217,8 +217,8 @@ def row_blocks(parts: Sequence[sp.csr_matrix], first: Ints, dtype: Any = np.floa
 
         map_tasks(fill, spans)
         filled_sizes, shift = filled_sizes + sizes_of_part, shift + A.shape[1]
-    short = [array.astype(np.uint32) for array in (first, start, offset)]
-    return RowBlocks((int(first[-1]), shift), *map(lock, (*short, columns, values)))
+    short_arrays = [array.astype(np.uint32) for array in (first, start, offset)]
+    return RowBlocks((int(first[-1]), shift), *map(lock, (*short_arrays, columns, values)))
 
 
 def store_blocks(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:

@@ -69,12 +69,12 @@ class Operator:
 
     def answers(self, ask: Request, vectors: Sequence[Floats]) -> list[Floats]:
         """What is asked for of several vectors."""
-        one, several = self.times, self.times_all
+        one, all_times = self.times, self.times_all
         if ask is Request.CYCLE:
-            one, several = self.cycle, self.cycle_all
-        if len(vectors) == 1 or several is None:
+            one, all_times = self.cycle, self.cycle_all
+        if len(vectors) == 1 or all_times is None:
             return [one(v) for v in vectors]
-        return several(vectors)
+        return all_times(vectors)
 
 
 def in_lockstep(K: Operator, iterations: Sequence[Iteration[Result]]) -> list[Result]:
@@ -95,26 +95,28 @@ def in_lockstep(K: Operator, iterations: Sequence[Iteration[Result]]) -> list[Re
             results[k] = end.value
             return None
 
-    waiting: dict[int, VectorRequest] = {}
+    waiting_tasks: dict[int, VectorRequest] = {}
     tasks: list[tuple[int, Floats | None]] = []
-    following = iter(range(len(iterations)))
+    next_numbers = iter(range(len(iterations)))
     while True:
-        free_places = _BESIDE - len(waiting) - len(tasks)
-        tasks += [(k, None) for k in itertools.islice(following, free_places)]
-        if not tasks and not waiting:
+        free_places = _BESIDE - len(waiting_tasks) - len(tasks)
+        tasks += [(k, None) for k in itertools.islice(next_numbers, free_places)]
+        if not tasks and not waiting_tasks:
             return cast(list[Result], results)
         for (k, _), request in zip(tasks, map_tasks(advanced, tasks), strict=True):
             if request is not None:
-                waiting[k] = request
+                waiting_tasks[k] = request
         tasks = []
-        if not waiting:
+        if not waiting_tasks:
             continue
         # Products first: those who looked at their sets meet the others at the next cycle.
-        products = any(ask is Request.TIMES for ask, _ in waiting.values())
+        products = any(ask is Request.TIMES for ask, _ in waiting_tasks.values())
         ask = Request.TIMES if products else Request.CYCLE
-        served = [k for k, (request_of_one, _) in waiting.items() if request_of_one is ask]
-        vectors = [waiting.pop(k)[1] for k in served]
-        tasks = list(zip(served, K.answers(ask, vectors), strict=True))
+        served_tasks = [
+            k for k, (request_of_one, _) in waiting_tasks.items() if request_of_one is ask
+        ]
+        vectors = [waiting_tasks.pop(k)[1] for k in served_tasks]
+        tasks = list(zip(served_tasks, K.answers(ask, vectors), strict=True))
 
 
 TOLERANCE = 1e-8  # residual relative to the load: displacements and pressures to about as much
@@ -174,8 +176,8 @@ class _Plane:
 
 def _search_plane(N: sp.csr_matrix, d: Floats, scale: Floats, diagonal: Floats) -> _Plane:
     rows = sp.csr_matrix(sp.diags(scale) @ N)
-    lifted = sp.csr_matrix(sp.diags(1 / diagonal) @ rows.T)
-    return _Plane(rows, scale * d, scale, lifted, _solver(sp.csc_matrix(rows @ lifted)))
+    scaled_rows = sp.csr_matrix(sp.diags(1 / diagonal) @ rows.T)
+    return _Plane(rows, scale * d, scale, scaled_rows, _solver(sp.csc_matrix(rows @ scaled_rows)))
 
 
 def _solver(gram: sp.csc_matrix) -> Apply:
@@ -247,9 +249,9 @@ class _Descent:
     def _goes_on(self, r: Floats) -> None:
         """Take off what pressures carry and what would move the body."""
         if self.plane is not None:
-            more = self.plane.carried(r)
-            r -= self.plane.rows.T @ more
-            self.carried += more
+            correction = self.plane.carried(r)
+            r -= self.plane.rows.T @ correction
+            self.carried += correction
         self.r = _without_motions(self.K.null, r)
         self.norm = _norm(r)
 
@@ -375,10 +377,10 @@ def projected_steps(
     """Run `projected_solution` in lockstep with others."""
     N = sp.csr_matrix(N)
     weight = np.asarray(N.multiply(N) @ (1 / K.diagonal)).ravel()
-    movable = weight > 0
-    scale = np.where(movable, 1 / np.sqrt(np.where(movable, weight, 1.0)), 0.0)
-    loop = _Loop(K, b, N, d, measure, stiffness, movable, scale, tolerance, limit)
-    return (yield from loop.run(np.array(start, dtype=bool) & movable, y))
+    is_movable = weight > 0
+    scale = np.where(is_movable, 1 / np.sqrt(np.where(is_movable, weight, 1.0)), 0.0)
+    loop = _Loop(K, b, N, d, measure, stiffness, is_movable, scale, tolerance, limit)
+    return (yield from loop.run(np.array(start, dtype=bool) & is_movable, y))
 
 
 @dataclass(eq=False)
@@ -403,66 +405,66 @@ class _Loop:
         if size == 0:
             y = np.zeros_like(y)
         check = _FIRST_CHECK
-        visited: set[bytes] = set()
-        singly = False
+        visited_sets: set[bytes] = set()
+        by_one = False
         while True:
             self.sets += 1
             descent = _Descent(self.K, self.b, self._plane_of(active), y)
             yield from descent.begin()
-            pressure, gap, new = yield from self._settle(descent, active, size, check)
-            if np.array_equal(new, active):
+            pressure, gap, next_set = yield from self._settle(descent, active, size, check)
+            if np.array_equal(next_set, active):
                 y = _without_motions(self.K.null, descent.y)
                 return self._result(y, pressure, gap, active)
             y = descent.y
-            reached = max(self.tolerance, descent.norm / size)
-            if singly:
+            accuracy = max(self.tolerance, descent.norm / size)
+            if by_one:
                 # The least index that is wrong: such a sequence of sets is finite (Murty, 1974).
-                first = int(np.argmax(new != active))
-                new = active.copy()
-                new[first] = not new[first]
-            elif new.tobytes() in visited:
-                singly = check <= self.tolerance
-                check = max(self.tolerance, 0.01 * min(check, reached))
-                visited.clear()
-            visited.add(new.tobytes())
+                first = int(np.argmax(next_set != active))
+                next_set = active.copy()
+                next_set[first] = not next_set[first]
+            elif next_set.tobytes() in visited_sets:
+                by_one = check <= self.tolerance
+                check = max(self.tolerance, 0.01 * min(check, accuracy))
+                visited_sets.clear()
+            visited_sets.add(next_set.tobytes())
             if self.sets >= _MOST_SETS:
-                self._give_up(descent.norm / size, new)
-            active = new
+                self._give_up(descent.norm / size, next_set)
+            active = next_set
 
     def _settle(
-        self, descent: _Descent, active: Bools, size: float, check: float
+        self, descent: _Descent, is_active: Bools, size: float, check: float
     ) -> Iteration[tuple[Floats, Floats, Bools]]:
         """Go down until the set is seen to be wrong, or has been right to the end."""
-        fresh = True
+        is_fresh = True
         while True:
             while descent.norm > max(check, self.tolerance) * size or (
-                fresh and descent.norm > self.tolerance * size
+                is_fresh and descent.norm > self.tolerance * size
             ):
                 if self.steps == self.limit:
-                    self._give_up(descent.norm / size, active)
+                    self._give_up(descent.norm / size, is_active)
                 yield from descent.step()
                 self.steps += 1
-                fresh = False
-            pressure, gap, new = self._predicted_set(descent, active)
-            if not np.array_equal(new, active) or descent.norm <= self.tolerance * size:
-                return pressure, gap, new
+                is_fresh = False
+            pressure, gap, next_set = self._predicted_set(descent, is_active)
+            if not np.array_equal(next_set, is_active) or descent.norm <= self.tolerance * size:
+                return pressure, gap, next_set
             check = max(self.tolerance, 0.1 * min(check, descent.norm / size))
 
-    def _predicted_set(self, descent: _Descent, active: Bools) -> tuple[Floats, Floats, Bools]:
-        pressure = np.zeros(len(active))
-        pressure[active] = descent.pressure
+    def _predicted_set(self, descent: _Descent, is_active: Bools) -> tuple[Floats, Floats, Bools]:
+        pressure = np.zeros(len(is_active))
+        pressure[is_active] = descent.pressure
         gap = self.N @ descent.y + self.d
-        gap[active] = 0.0
+        gap[is_active] = 0.0
         trial = np.where(self.is_movable, pressure - self.stiffness * gap / self.measure, 0.0)
         # What lies within the accuracy of the iteration changes nothing: faces that only touch
         # must not make the set flicker.
         doubt = self.tolerance * float(np.abs(trial).max(initial=0.0))
-        return pressure, gap, np.where(np.abs(trial) > doubt, trial > 0, active)
+        return pressure, gap, np.where(np.abs(trial) > doubt, trial > 0, is_active)
 
-    def _plane_of(self, active: Bools) -> _Plane | None:
-        if not active.any():
+    def _plane_of(self, is_active: Bools) -> _Plane | None:
+        if not is_active.any():
             return None
-        rows = np.nonzero(active)[0]
+        rows = np.nonzero(is_active)[0]
         return _search_plane(self.N[rows], self.d[rows], self.scale[rows], self.K.diagonal)
 
     def _size(self) -> Iteration[float]:
@@ -473,22 +475,22 @@ class _Loop:
             return size
         return _norm((yield Request.TIMES, plane.nearest(np.zeros(len(self.b)))))
 
-    def _result(self, y: Floats, pressure: Floats, gap: Floats, active: Bools) -> ProjectedState:
+    def _result(self, y: Floats, pressure: Floats, gap: Floats, is_active: Bools) -> ProjectedState:
         length = np.abs(gap / self.measure).max(initial=0.0)
-        stuck = ~self.is_movable & (gap / self.measure < -1e-8 * length)
-        if stuck.any():
+        is_overlapping = ~self.is_movable & (gap / self.measure < -1e-8 * length)
+        if is_overlapping.any():
             raise ConvergenceError(
-                f"contact: {int(stuck.sum())} of {len(gap)} groups are pressed into each other by "
-                f"the supports, with a smallest gap of {gap[stuck].min():.3g}; no pressure can "
-                "open them."
+                f"contact: {int(is_overlapping.sum())} of {len(gap)} groups are pressed into each "
+                f"other by the supports, with a smallest gap of {gap[is_overlapping].min():.3g}; "
+                "no pressure can open them."
             )
-        return ProjectedState(y, np.maximum(pressure, 0.0), gap, active, self.steps, self.sets)
+        return ProjectedState(y, np.maximum(pressure, 0.0), gap, is_active, self.steps, self.sets)
 
-    def _give_up(self, residual: float, active: Bools) -> None:
+    def _give_up(self, residual: float, is_active: Bools) -> None:
         raise ConvergenceError(
             f"contact: after {self.steps} steps of conjugate gradients and {self.sets} sets the "
-            f"residual is {residual:.3g} of the load and {int(active.sum())} of {len(active)} "
-            "groups are closed. Refine the mesh along the crack, start from "
+            f"residual is {residual:.3g} of the load and {int(is_active.sum())} of "
+            f"{len(is_active)} groups are closed. Refine the mesh along the crack, start from "
             'Numerics(initial_set="open"), or choose a direct solver.'
         )
 

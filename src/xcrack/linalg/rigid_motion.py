@@ -40,50 +40,52 @@ class Motion:
         return np.abs(np.ascontiguousarray(self.modes.T)).max(axis=1)
 
 
-def free_modes(space: FunctionSpace, fixed: Bools) -> Floats:
+def free_modes(space: FunctionSpace, is_fixed: Bools) -> Floats:
     """Orthonormal rigid motions left by supports of standard unknowns `(n,)`: `(n, k)`."""
     R = np.linalg.qr(rigid_modes(space.node_points))[0]
-    supported = R[fixed]
-    gram = supported.T @ supported
+    supported_rows = R[is_fixed]
+    gram = supported_rows.T @ supported_rows
     w, V = np.linalg.eigh(gram)
     return np.asarray(R @ V[:, w < 1e-10 * max(float(w.max(initial=0.0)), 1.0 / len(R))])
 
 
-def free_motion(space: FunctionSpace, fixed: Bools, free: Floats | None = None) -> Motion:
+def free_motion(
+    space: FunctionSpace, is_fixed: Bools, free_motions: Floats | None = None
+) -> Motion:
     """Rigid motions left by the supports, and far standard unknowns to pin.
 
     Parameters
     ----------
     space : FunctionSpace
-    fixed : (n_dof,) array of bool
+    is_fixed : (n_dof,) array of bool
         Unknowns that supports decide.
-    free : (n, k) array, optional
+    free_motions : (n, k) array, optional
         As of `free_modes`, where it is known.
     """
     if space.joints or any(cut.n_tips == 0 for cut in space.cuts):
-        _check_pieces(space, fixed)
-    if free is None:
-        free = free_modes(space, fixed[: space.n_nodes * space.dim])
-    modes = np.zeros((space.n_dof, free.shape[1]))
-    modes[: len(free)] = free
-    if free.shape[1] == 0:
+        _check_pieces(space, is_fixed)
+    if free_motions is None:
+        free_motions = free_modes(space, is_fixed[: space.n_nodes * space.dim])
+    modes = np.zeros((space.n_dof, free_motions.shape[1]))
+    modes[: len(free_motions)] = free_motions
+    if free_motions.shape[1] == 0:
         return Motion(modes, np.zeros(0, dtype=np.int64))
-    plain = np.ones(space.n_nodes, dtype=bool)
-    plain[space.cell_nodes[space.enriched]] = False
-    plain[space.mesh.n_points :] = False
+    is_standard = np.ones(space.n_nodes, dtype=bool)
+    is_standard[space.cell_nodes[space.enriched]] = False
+    is_standard[space.mesh.n_points :] = False
     every = np.zeros(space.n_nodes, dtype=bool)
     every[: space.mesh.n_points] = True
-    for chosen in (plain, every):
+    for chosen in (is_standard, every):
         candidates = (np.nonzero(chosen)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
-        candidates = candidates[~fixed[candidates]]
-        if len(candidates) < free.shape[1]:
+        candidates = candidates[~is_fixed[candidates]]
+        if len(candidates) < free_motions.shape[1]:
             continue
         triangle, pivots = scipy.linalg.qr(modes[candidates].T, mode="r", pivoting=True)
         diagonal = np.abs(np.diag(triangle))
         # Two points in 3D leave the turn about their line free.
         if diagonal[-1] > 1e-6 * diagonal[0]:
             break
-    return Motion(modes, candidates[pivots[: free.shape[1]]])
+    return Motion(modes, candidates[pivots[: free_motions.shape[1]]])
 
 
 def balanced_loads(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Floats, float]:
@@ -138,7 +140,7 @@ def without_motion(motion: Motion, u: Floats) -> Floats:
     return np.asarray(u - motion.modes @ (motion.modes.T @ u))
 
 
-def _check_pieces(space: FunctionSpace, fixed: Bools) -> None:
+def _check_pieces(space: FunctionSpace, is_fixed: Bools) -> None:
     """Raise where a crack cuts off a piece that nothing holds."""
     piece_of_node, n_pieces, volume = pieces(space)
     if n_pieces == 1:
@@ -147,7 +149,7 @@ def _check_pieces(space: FunctionSpace, fixed: Bools) -> None:
     R = rigid_modes(x) / np.abs(rigid_modes(x)).max(axis=0)
     for k in range(n_pieces):
         nodes = piece_of_node == k
-        mask = fixed[: len(R)] & np.repeat(nodes, d)
+        mask = is_fixed[: len(R)] & np.repeat(nodes, d)
         rank = np.linalg.matrix_rank(R[mask], tol=1e-8) if mask.any() else 0
         if rank < R.shape[1]:
             raise ProblemError(
@@ -172,10 +174,10 @@ def pieces(space: FunctionSpace) -> tuple[Ints, int, Floats]:
     piece[of_sub] = number
     share = np.bincount(number, subs.fraction * mesh.volume[subs.cell], len(names))
     nodes = space.cell_nodes
-    flat, cell = nodes.ravel(), np.repeat(np.arange(len(nodes)), nodes.shape[1])
-    sides = np.stack(space.node_side, axis=1)[flat]
+    node, cell = nodes.ravel(), np.repeat(np.arange(len(nodes)), nodes.shape[1])
+    sides = np.stack(space.node_side, axis=1)[node]
     of_node = np.zeros(space.n_nodes, dtype=np.int64)
-    of_node[flat] = piece[parts * cell + part_numbers(space, cell, sides)]
+    of_node[node] = piece[parts * cell + part_numbers(space, cell, sides)]
     return of_node, len(names), share / share.sum()
 
 

@@ -238,10 +238,10 @@ class AbaqusModel:
             for g in self.groups
             if base_kind(g.kind) or not has_body
         ]
-        given: list[tuple[str, str, Ints]] = list(sets)
+        set_entries: list[tuple[str, str, Ints]] = list(sets)
         for key, one in self.element_sets.items():
             name = self.shown_name(key, one)
-            given += [
+            set_entries += [
                 (group.kind, name, group.nodes[rows])
                 for group, rows in self.rows_of(one.members)
                 if base_kind(group.kind)
@@ -249,7 +249,7 @@ class AbaqusModel:
         for key, one in self.surfaces.items():
             name = self.shown_name(key, one)
             faces = np.zeros(0, np.int64) if one.faces is None else one.faces
-            given += [(kind, name, rows) for kind, rows in self.facets_of(one.members, faces)]
+            set_entries += [(kind, name, rows) for kind, rows in self.facets_of(one.members, faces)]
         point_sets = [
             (self.shown_name(key, one), one.members) for key, one in self.node_sets.items()
         ]
@@ -258,7 +258,7 @@ class AbaqusModel:
             for key, one in self.surfaces.items()
             if one.faces is None
         ]
-        return RawMesh(self.points, blocks, given, point_sets)
+        return RawMesh(self.points, blocks, set_entries, point_sets)
 
     def shown_name(self, key: tuple[str, str], one: NamedSet) -> str:
         """Name of a set in the mesh: with its instance where there are several."""
@@ -383,7 +383,7 @@ def _assemble_parts(
     instances: dict[str, Keyword] = {}
     part: list[Keyword] | None = None
     instance, step, n_steps = "", None, 0
-    placed: set[str] = set()
+    placed_titles: set[str] = set()
     for keyword in keywords:
         name = keyword.name
         if name == "PART":
@@ -416,7 +416,7 @@ def _assemble_parts(
                 )
             placing = _placing(keyword)
             if title:
-                placed.add(title)
+                placed_titles.add(title)
                 begin, content = parts[title]
                 lines.append((DeckLine(begin, instance, None), None))
                 lines += [(DeckLine(inner, instance, None), placing) for inner in content]
@@ -430,16 +430,16 @@ def _assemble_parts(
             lines.append((DeckLine(keyword, instance, step), None))
             if name == "END STEP":
                 step = None
-    alone = [title for title in parts if title not in placed]
+    unplaced = [title for title in parts if title not in placed_titles]
     if not instances:  # a deck of parts without an assembly: each stands where it was made
-        within: list[tuple[DeckLine, Placing]] = []
+        part_lines: list[tuple[DeckLine, Placing]] = []
         for begin, content in parts.values():
             title = begin.option("NAME") if len(parts) > 1 else ""
-            within += [(DeckLine(inner, title, None), None) for inner in (begin, *content)]
+            part_lines += [(DeckLine(inner, title, None), None) for inner in (begin, *content)]
         titles = [begin.option("NAME") for begin, _ in parts.values()]
-        return within + lines, tuple(titles) if len(parts) > 1 else (), ()
-    unused = tuple(parts[title][0].place for title in alone)
-    return lines, tuple(instances), unused
+        return part_lines + lines, tuple(titles) if len(parts) > 1 else (), ()
+    unused_places = tuple(parts[title][0].place for title in unplaced)
+    return lines, tuple(instances), unused_places
 
 
 def _placing(keyword: Keyword) -> Placing:
@@ -507,9 +507,12 @@ class _Builder:
             angle = np.radians(x[:, 1])
             x = np.stack([x[:, 0] * np.cos(angle), x[:, 0] * np.sin(angle), x[:, 2]], axis=1)
         elif system == "S":  # spherical: radius, longitude and latitude in degrees
-            along, up = np.radians(x[:, 1]), np.radians(x[:, 2])
-            flat = x[:, 0] * np.cos(up)
-            x = np.stack([flat * np.cos(along), flat * np.sin(along), x[:, 0] * np.sin(up)], axis=1)
+            longitude, up = np.radians(x[:, 1]), np.radians(x[:, 2])
+            radius = x[:, 0] * np.cos(up)
+            x = np.stack(
+                [radius * np.cos(longitude), radius * np.sin(longitude), x[:, 0] * np.sin(up)],
+                axis=1,
+            )
         elif system != "R":
             keyword.refuse(f"SYSTEM={system}: R, C and S are known.")
         if placing is not None:
@@ -599,7 +602,7 @@ class _Builder:
     ) -> dict[tuple[str, str], NamedSet]:
         """Surfaces of element faces, and of nodes."""
         result: dict[tuple[str, str], NamedSet] = {}
-        free: set[tuple[int, int]] | None = None
+        free_faces: set[tuple[int, int]] | None = None
         for line in self._surfaces:
             keyword = line.keyword
             name = keyword.option("NAME")
@@ -628,10 +631,10 @@ class _Builder:
                     owners += members
                     faces += [int(match[1]) - 1] * len(members)
                 elif not face:
-                    if free is None:
-                        free = _free_faces(groups)
-                    here = set(members)
-                    pairs = sorted(pair for pair in free if pair[0] in here)
+                    if free_faces is None:
+                        free_faces = _free_faces(groups)
+                    member_set = set(members)
+                    pairs = sorted(pair for pair in free_faces if pair[0] in member_set)
                     owners += [pair[0] for pair in pairs]
                     faces += [pair[1] for pair in pairs]
                 elif face not in ("SPOS", "SNEG"):  # sides of a shell
@@ -639,9 +642,9 @@ class _Builder:
                         f"the face {face!r:.20} is not known: give one of S1 to S6.", number
                     )
             key = scope, name.casefold()
-            known = result.get(key)
-            if known is not None and known.faces is not None:
-                owners, faces = [*known.members, *owners], [*known.faces, *faces]
+            entry = result.get(key)
+            if entry is not None and entry.faces is not None:
+                owners, faces = [*entry.members, *owners], [*entry.faces, *faces]
             result[key] = NamedSet(name, np.array(owners, np.int64), np.array(faces, np.int64))
         return result
 
@@ -666,11 +669,11 @@ class _SetTable:
                     parts += [self.members(entry, line, number) for entry in entries if entry]
             members = np.concatenate(parts).tolist()
         key = (line.instance, name.casefold())
-        known = self.named.get(key)
-        before = [] if known is None else known.members.tolist()
+        previous = self.named.get(key)
+        earlier_members = [] if previous is None else previous.members.tolist()
         self.named[key] = NamedSet(
-            name if known is None else known.name,
-            np.array(list(dict.fromkeys([*before, *members])), dtype=np.int64),
+            name if previous is None else previous.name,
+            np.array(list(dict.fromkeys([*earlier_members, *members])), dtype=np.int64),
         )
 
     def members(self, entry: str, line: DeckLine, number: int | None) -> Ints:
@@ -680,8 +683,8 @@ class _SetTable:
         keyword = line.keyword
         if len(entries) < 2:
             keyword.refuse("GENERATE needs a first and a last number, and a step if not 1.", number)
-        first, last, *more = (keyword.whole(entry, number, "a number") for entry in entries[:3])
-        step = more[0] if more else 1
+        first, last, *rest = (keyword.whole(entry, number, "a number") for entry in entries[:3])
+        step = rest[0] if rest else 1
         if not step or last - first > _MOST_MEMBERS * abs(step):
             words = f"GENERATE from {first} to {last} makes too many members: give those there are."
             keyword.refuse(words, number)
@@ -694,7 +697,9 @@ class _SetTable:
 def _instance_of(line: DeckLine, instances: Sequence[str]) -> str:
     """Instance whose numbers a keyword names."""
     name = line.keyword.options.get("INSTANCE", line.instance)
-    return next((known for known in instances if known.casefold() == name.casefold()), name)
+    return next(
+        (instance for instance in instances if instance.casefold() == name.casefold()), name
+    )
 
 
 def _find(
@@ -729,7 +734,9 @@ def _members(
     scope = _instance_of(line, instances)
     first, dot, remainder = entry.partition(".")
     if dot and remainder.isdigit():
-        scope = next((known for known in instances if known.casefold() == first.casefold()), first)
+        scope = next(
+            (instance for instance in instances if instance.casefold() == first.casefold()), first
+        )
         entry = remainder
     if entry.isdigit():
         label = int(entry)
@@ -777,8 +784,8 @@ def _node_rows(keyword: Keyword) -> tuple[list[int], Floats]:
     labels, places = [], []
     for line, entries in keyword.rows:
         labels.append(keyword.whole(entries[0], line, "the number of a node"))
-        given = [keyword.number(entry, line, "a coordinate", 0.0) for entry in entries[1:4]]
-        places.append([*given, 0.0, 0.0, 0.0][:3])
+        coordinates = [keyword.number(entry, line, "a coordinate", 0.0) for entry in entries[1:4]]
+        places.append([*coordinates, 0.0, 0.0, 0.0][:3])
     return labels, np.array(places, dtype=float).reshape(-1, 3)
 
 
@@ -787,10 +794,10 @@ def _number_table(texts: Sequence[str], width: int) -> Floats:
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # of numpy, about what is no number
         try:
-            flat = np.fromstring(numbers_of_text(",".join(texts)), sep=",")
+            values = np.fromstring(numbers_of_text(",".join(texts)), sep=",")
         except (ValueError, DeprecationWarning):
-            flat = np.zeros(0)
-    return flat.reshape(-1, width) if len(flat) == width * len(texts) else np.zeros((0, width))
+            values = np.zeros(0)
+    return values.reshape(-1, width) if len(values) == width * len(texts) else np.zeros((0, width))
 
 
 def _element_rows(keyword: Keyword, kind: str) -> list[list[int]]:
@@ -806,20 +813,20 @@ def _element_rows(keyword: Keyword, kind: str) -> list[list[int]]:
             goes_on = text.rstrip().endswith(",")
         return labels
     width = _NODES[kind] + 1
-    flat: list[int] = []
+    numbers: list[int] = []
     for line, text in keyword.data:
         entries = [entry for entry in text.split(",") if entry.strip()]
         try:
-            flat += map(int, entries)
+            numbers += map(int, entries)
         except ValueError:
             for entry in entries:
                 keyword.whole(entry.strip(), line, "the number of a node")
-    if len(flat) % width:
+    if len(numbers) % width:
         keyword.refuse(
-            f"{len(flat)} numbers for elements of {width} each (a number and {width - 1} nodes): "
-            "give the whole deck, or the type that the elements have."
+            f"{len(numbers)} numbers for elements of {width} each (a number and {width - 1} "
+            "nodes): give the whole deck, or the type that the elements have."
         )
-    return [flat[i : i + width] for i in range(0, len(flat), width)]
+    return [numbers[i : i + width] for i in range(0, len(numbers), width)]
 
 
 def abaqus_text(mesh: Mesh) -> str:
@@ -847,11 +854,11 @@ def abaqus_text(mesh: Mesh) -> str:
             )
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
     rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
-    flat = ", 0." * (3 - mesh.dim)
+    third = ", 0." * (3 - mesh.dim)
     facet_type, cell_type = _WRITTEN_TYPES[mesh.dim]
     lines = ["*HEADING", "mesh written by xcrack", "*NODE"]
     lines += [
-        f"{i}, {', '.join(map(repr, x))}{flat}" for i, x in enumerate(mesh.points.tolist(), 1)
+        f"{i}, {', '.join(map(repr, x))}{third}" for i, x in enumerate(mesh.points.tolist(), 1)
     ]
     if len(rows):
         lines += [f"*ELEMENT, TYPE={facet_type}", *_rows(mesh.facets[rows], 1)]

@@ -147,22 +147,22 @@ class _Archive:
         if "SOLID" not in [entry.upper() for entry in entries]:
             _refuse(self.path, line, "EBLOCK without SOLID is not read: write it with CDWRITE, DB.")
         width = self._format(line)[0][0]
-        given: list[int] = []
+        numbers: list[int] = []
         for number, text in self._lines:
             if text.strip() == "-1":
                 return
             pieces = [text[k : k + width] for k in range(0, len(text.rstrip()), width)]
             row = [_whole_entry(piece, self.path, number) for piece in pieces]
-            if given:
-                given += row
+            if numbers:
+                numbers += row
             elif len(row) < _ENTRIES:
                 _refuse(self.path, number, f"{text.strip()!r:.60} is no element: {_AGAIN}.")
             else:
-                given = row
-            if len(given) - _ENTRIES >= given[8]:
-                nodes = given[_ENTRIES : _ENTRIES + given[8]]
-                self.elements.append((given[10], given[1], nodes))
-                given = []
+                numbers = row
+            if len(numbers) - _ENTRIES >= numbers[8]:
+                nodes = numbers[_ENTRIES : _ENTRIES + numbers[8]]
+                self.elements.append((numbers[10], numbers[1], nodes))
+                numbers = []
         _refuse(self.path, line, f"the elements have no end, the file is cut off: {_AGAIN}.")
 
     def take_component(self, line: int, entries: Sequence[str]) -> None:

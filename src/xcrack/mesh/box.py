@@ -72,25 +72,25 @@ def box(
     points = np.stack([axis[i] for axis, i in zip(axes, index)], axis=1)
     stride = np.append(np.cumprod((count + 1)[:0:-1])[::-1], 1)
     place = np.indices(tuple(count)).reshape(d, -1).T
-    first, odd = place @ stride, place % 2 == 1
+    first, is_odd = place @ stride, place % 2 == 1
     simplices = np.empty((len(place), factorial(d), d + 1), dtype=np.int64)
     for p, path in enumerate(permutations(range(d))):
         corner = np.zeros(d, dtype=np.int64)
         for v in range(d + 1):
             # Mirroring every second block keeps the mesh conforming, with alternating diagonals.
-            simplices[:, p, v] = first + np.where(odd, 1 - corner, corner) @ stride
+            simplices[:, p, v] = first + np.where(is_odd, 1 - corner, corner) @ stride
             if v < d:
                 corner[path[v]] = 1
-    stacked = simplices.reshape(-1, d + 1)
-    x = points[stacked]
+    cells = simplices.reshape(-1, d + 1)
+    x = points[cells]
     with np.errstate(all="ignore"):  # sides too short for a number are refused by the mesh
         turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
-    stacked[turn] = stacked[turn][:, [1, 0, *range(2, d + 1)]]
+    cells[turn] = cells[turn][:, [1, 0, *range(2, d + 1)]]
     sets = {}
     for axis, both in enumerate(_SIDES[d]):
         for name, end in zip(both, (0, count[axis]), strict=True):
-            sets[name] = _facets_on(stacked, index[axis] == end)
-    return sound_mesh(points, stacked, sets)
+            sets[name] = _facets_on(cells, index[axis] == end)
+    return sound_mesh(points, cells, sets)
 
 
 def _facets_on(cells: Ints, on_side: Bools) -> Ints:

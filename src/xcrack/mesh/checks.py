@@ -39,7 +39,7 @@ def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
     MeshError
         Whatever keeps them from being a mesh; the message names the first such point or cell.
     """
-    x = numbers(points, "points of the mesh", finite=False, error=MeshError)
+    x = numbers(points, "points of the mesh", must_be_finite=False, error=MeshError)
     c = whole_numbers(cells, "cells of the mesh", error=MeshError)
     if c.size == 0:
         raise MeshError(
@@ -66,15 +66,15 @@ def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
             f"cell {int(np.argmax(((c < 0) | (c >= len(x))).any(axis=1)))} names a point outside "
             f"0 ... {len(x) - 1}: points are numbered from 0."
         )
-    unused = np.bincount(c.ravel(), minlength=len(x)) == 0
-    if unused.any():
+    is_unused = np.bincount(c.ravel(), minlength=len(x)) == 0
+    if is_unused.any():
         raise MeshError(
-            f"point {int(np.argmax(unused))} belongs to no cell ({int(unused.sum())} such "
+            f"point {int(np.argmax(is_unused))} belongs to no cell ({int(is_unused.sum())} such "
             "points): remove them (read_mesh does)."
         )
-    doubled = np.sort(c, axis=1)
-    order = np.lexsort(doubled.T)
-    is_repeated = (np.diff(doubled[order], axis=0) == 0).all(axis=1)
+    sorted_cells = np.sort(c, axis=1)
+    order = np.lexsort(sorted_cells.T)
+    is_repeated = (np.diff(sorted_cells[order], axis=0) == 0).all(axis=1)
     if is_repeated.any():
         raise MeshError(
             f"cells {int(order[np.argmax(is_repeated)])} and "
@@ -92,16 +92,16 @@ def _oriented_cells(points: Floats, cells: Ints) -> Ints:
         with np.errstate(all="ignore"):  # lengths whose products are too small for a number
             volume[part] = np.linalg.det(x[:, 1:] - x[:, :1])
         longest[part] = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
-    flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
-    if flat.any():
-        worst = int(np.argmax(flat))
+    is_flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
+    if is_flat.any():
+        worst = int(np.argmax(is_flat))
         raise MeshError(
             f"cell {worst} at {at(points[cells[worst]].mean(axis=0))} has no volume "
-            f"({int(flat.sum())} such cells): remesh, or merge its points."
+            f"({int(is_flat.sum())} such cells): remesh, or merge its points."
         )
-    turned = np.array(cells)
-    turned[volume < 0] = turned[volume < 0][:, [1, 0, *range(2, cells.shape[1])]]
-    return turned
+    cells_turned = np.array(cells)
+    cells_turned[volume < 0] = cells_turned[volume < 0][:, [1, 0, *range(2, cells.shape[1])]]
+    return cells_turned
 
 
 def checked_sets(
@@ -225,13 +225,13 @@ def _overlapping_cells(points: Floats, cells: Ints, owner: Ints, corner: Floats)
     middle = shape.mean(axis=1)
     reach = np.linalg.norm(shape - middle[:, None], axis=2).max(axis=1)
     step = np.floor(np.log2(reach / reach.min())).astype(np.int64)
-    overlapping = np.zeros(len(x), dtype=np.int64) - 1
+    cell_of_point = np.zeros(len(x), dtype=np.int64) - 1
     for k in np.unique(step):
         rows = np.nonzero(step == k)[0]
-        tree, most = cKDTree(middle[rows]), float(reach[rows].max())
+        tree, largest_reach = cKDTree(middle[rows]), float(reach[rows].max())
         for begin in range(0, len(x), chunk := max(_AT_ONCE // 100, 1)):
             part = np.arange(begin, min(begin + chunk, len(x)))
-            point, cell = pairs_within(tree, x[part], np.full(len(part), most))
+            point, cell = pairs_within(tree, x[part], np.full(len(part), largest_reach))
             point, cell = part[point], rows[cell]
             is_close = np.linalg.norm(middle[cell] - x[point], axis=1) < reach[cell]
             is_close &= cell != owner[point]
@@ -241,14 +241,14 @@ def _overlapping_cells(points: Floats, cells: Ints, owner: Ints, corner: Floats)
                 np.swapaxes(edges, 1, 2), (x[point] - shape[cell, 0])[..., None]
             )
             bary = np.concatenate([1 - coordinates.sum(axis=1), coordinates[..., 0]], axis=1)
-            inside = bary.min(axis=1) > _INSIDE
-            overlapping[point[inside]] = cell[inside]
-    if (overlapping < 0).all():
+            is_inside = bary.min(axis=1) > _INSIDE
+            cell_of_point[point[is_inside]] = cell[is_inside]
+    if (cell_of_point < 0).all():
         return []
-    i = int(np.argmax(overlapping >= 0))
+    i = int(np.argmax(cell_of_point >= 0))
     return [
-        f"cells {int(owner[i])} and {int(overlapping[i])} of the mesh overlap at {at(x[i])} "
-        f"({int((overlapping >= 0).sum())} such places): parts of the body are there twice, and "
+        f"cells {int(owner[i])} and {int(cell_of_point[i])} of the mesh overlap at {at(x[i])} "
+        f"({int((cell_of_point >= 0).sum())} such places): parts of the body are there twice, and "
         f"twice as stiff. Unite them before meshing (gmsh: BooleanUnion or BooleanFragments)."
     ]
 

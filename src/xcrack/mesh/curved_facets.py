@@ -63,9 +63,9 @@ class CurvedFacets:
         if not len(x):
             return x, np.zeros(0, dtype=np.int64)
         count = min(_NEIGHBOURS, len(self.points))
-        near = self._tree.query(x, k=count)[1].reshape(len(x), count).astype(np.int64)
+        candidates = self._tree.query(x, k=count)[1].reshape(len(x), count).astype(np.int64)
         pieces = (*self._owners, self.nodes, *self._balls)
-        foot, owner = nearest_on_pieces(lock(x.view()), lock(near), *pieces)
+        foot, owner = nearest_on_pieces(lock(x.view()), lock(candidates), *pieces)
         return foot, owner
 
     @cached_property
@@ -80,10 +80,10 @@ class CurvedFacets:
     @cached_property
     def _owners(self) -> tuple[Ints, Ints, Ints]:
         """Pieces that have each node: offsets, pieces, and the number of the node in them."""
-        flat = self.facets.ravel()
-        order = np.argsort(flat, kind="stable")
+        members = self.facets.ravel()
+        order = np.argsort(members, kind="stable")
         piece, local = np.divmod(order, self.facets.shape[1])
-        begin = offsets(np.bincount(flat, minlength=len(self.points)))
+        begin = offsets(np.bincount(members, minlength=len(self.points)))
         return lock(begin), lock(piece), lock(local)
 
     @cached_property
@@ -101,11 +101,11 @@ class CurvedFacets:
         edges = np.concatenate([self.facets[:, each] for each in _edge_nodes()])
         ends = np.sort(edges[:, :2], axis=1)
         _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
-        once = edges[first[count == 1]]
-        if not len(once):
+        border_edges = edges[first[count == 1]]
+        if not len(border_edges):
             return None
-        used, facets = np.unique(once, return_inverse=True)
-        return CurvedFacets(lock(self.points[used]), lock(facets.reshape(-1, 5)))
+        point_numbers, facets = np.unique(border_edges, return_inverse=True)
+        return CurvedFacets(lock(self.points[point_numbers]), lock(facets.reshape(-1, 5)))
 
     def places(self, owner: Ints, bary: Floats) -> tuple[Floats, Floats]:
         """Points of pieces `(q, d)` at barycentric coordinates, and derivatives along these."""
@@ -153,10 +153,10 @@ def lattice(points: Floats, facets: Ints) -> Lattice:
     local = local.reshape(facets.shape)
     pairs = local_edges(d - 1)
     ends = local[:, pairs]
-    turned = ends[..., 0] > ends[..., 1]
+    is_turned = ends[..., 0] > ends[..., 1]
     edges, number = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     number = number.reshape(len(facets), len(pairs))
-    three = np.where(turned[..., None], [2, 1, 0], [0, 1, 2])
+    three = np.where(is_turned[..., None], [2, 1, 0], [0, 1, 2])
     first = len(corner) + 3 * number[..., None] + three
     nodes = [local, first.reshape(len(facets), -1)]
     if d == 3:
@@ -172,21 +172,21 @@ def arcs(a: Floats, middle: Floats, b: Floats) -> Floats:
     """Points at the quarters of circular arcs from a to b through a third point `(e, 3, d)`."""
     chord = b - a
     half = np.linalg.norm(chord, axis=1) / 2
-    along = chord / (2 * half)[:, None]
-    away = middle - (a + b) / 2
-    share = np.einsum("ed,ed->e", away, along)
-    away -= share[:, None] * along
-    height = np.linalg.norm(away, axis=1)
+    chord_direction = chord / (2 * half)[:, None]
+    offset = middle - (a + b) / 2
+    share = np.einsum("ed,ed->e", offset, chord_direction)
+    offset -= share[:, None] * chord_direction
+    height = np.linalg.norm(offset, axis=1)
     is_straight = height <= _STRAIGHT * half
     height = np.where(is_straight, half, height)
-    upward = away / height[:, None]
+    height_direction = offset / height[:, None]
     centre = (share**2 + height**2 - half**2) / (2 * height)
     radius, angle = np.hypot(half, centre), np.arctan2(half, -centre)
     result = np.empty((len(a), 3, a.shape[1]))
     for k, quarter in enumerate((-0.5, 0.0, 0.5)):
         x = np.where(is_straight, quarter * half, radius * np.sin(quarter * angle))
         y = np.where(is_straight, 0.0, centre + radius * np.cos(quarter * angle))
-        result[:, k] = (a + b) / 2 + x[:, None] * along + y[:, None] * upward
+        result[:, k] = (a + b) / 2 + x[:, None] * chord_direction + y[:, None] * height_direction
     return result
 
 
@@ -198,7 +198,7 @@ def _with_insides(points: Floats, facets: Ints) -> Floats:
     """
     x = points.copy()
     middle = {(0, 1): 4, (0, 2): 7, (1, 2): 10}
-    six = points[facets[:, [0, 1, 2, 4, 7, 10]]]
+    parabola = points[facets[:, [0, 1, 2, 4, 7, 10]]]
     for node, (k, i, j) in zip(facets[:, 12:].T, _INNER):
         bary = np.full(3, 0.25)
         bary[k] = 0.5
@@ -208,26 +208,29 @@ def _with_insides(points: Floats, facets: Ints) -> Floats:
         rise = top - (points[facets[:, i]] + points[facets[:, j]]) / 2
         edge = np.zeros(3)
         edge[[i, j]] = 0.5
-        there, here = _parabolic_normals(six, edge), _parabolic_normals(six, bary)
-        height = np.einsum("kd,kd->k", rise, there)
+        edge_normal, node_normal = (
+            _parabolic_normals(parabola, edge),
+            _parabolic_normals(parabola, bary),
+        )
+        height = np.einsum("kd,kd->k", rise, edge_normal)
         half = np.linalg.norm(chord, axis=1) / 2
         curvature = 2 * height / (half**2 + np.einsum("kd,kd->k", rise, rise))
         reach = np.linalg.norm(other - one, axis=1) / 2
-        bent = np.minimum(np.abs(curvature * reach), 1.0)
-        lift = curvature * reach**2 / (1 + np.sqrt(1 - bent**2))
-        beside = rise - height[:, None] * there
-        x[node] = (one + other) / 2 + beside / 4 + lift[:, None] * here
+        bend = np.minimum(np.abs(curvature * reach), 1.0)
+        lift = curvature * reach**2 / (1 + np.sqrt(1 - bend**2))
+        tangential_rise = rise - height[:, None] * edge_normal
+        x[node] = (one + other) / 2 + tangential_rise / 4 + lift[:, None] * node_normal
     return x
 
 
-def _parabolic_normals(six: Floats, bary: Floats) -> Floats:
+def _parabolic_normals(parabola: Floats, bary: Floats) -> Floats:
     """Unit normals of second-order triangles `(k, 6, 3)` at one place."""
     a, b, c = bary
     slope = np.array([
         (1 - 4 * a, 1 - 4 * a), (4 * b - 1, 0), (0, 4 * c - 1), (4 * (a - b), -4 * b),
         (-4 * c, 4 * (a - c)), (4 * c, 4 * b),
     ])  # fmt: skip
-    u, v = np.einsum("as,kad->skd", slope, six)
+    u, v = np.einsum("as,kad->skd", slope, parabola)
     normal = np.cross(u, v)
     return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None])
 
@@ -247,27 +250,27 @@ def raised_lattice(mesh: Mesh, facets: Ints, pairs: Ints, middles: Floats) -> La
     middles : (e, d) array, length
         Their midside nodes.
     """
-    flat = lattice(mesh.points, facets)
-    ends = flat.corner[flat.edges]
+    grid = lattice(mesh.points, facets)
+    ends = grid.corner[grid.edges]
     place = (mesh.points[ends[:, 0]] + mesh.points[ends[:, 1]]) / 2
-    row, known = rows_of(np.sort(pairs, axis=1), ends, mesh.n_points)
-    place[known] = middles[row[known]]
-    points, count = flat.points.copy(), len(flat.corner)
+    row, has_row = rows_of(np.sort(pairs, axis=1), ends, mesh.n_points)
+    place[has_row] = middles[row[has_row]]
+    points, count = grid.points.copy(), len(grid.corner)
     arc = arcs(mesh.points[ends[:, 0]], place, mesh.points[ends[:, 1]])
-    points[count : flat.inner] = arc.reshape(-1, mesh.dim)
+    points[count : grid.inner] = arc.reshape(-1, mesh.dim)
     if mesh.dim == 3:
-        points = _with_insides(points, flat.facets)
-    return replace(flat, points=points)
+        points = _with_insides(points, grid.facets)
+    return replace(grid, points=points)
 
 
-def rows_of(pairs: Ints, sought: Ints, n_points: int) -> tuple[Ints, Bools]:
+def rows_of(pairs: Ints, pairs_to_find: Ints, n_points: int) -> tuple[Ints, Bools]:
     """Rows of pairs of points, smaller first, in a list of such; and which are there."""
-    key, sought_key = (p[:, 0] * np.int64(n_points) + p[:, 1] for p in (pairs, sought))
+    key, sought_key = (p[:, 0] * np.int64(n_points) + p[:, 1] for p in (pairs, pairs_to_find))
     order = np.argsort(key, kind="stable")
     place = np.minimum(np.searchsorted(key[order], sought_key), max(len(key) - 1, 0))
     row = order[place] if len(key) else np.zeros(len(sought_key), dtype=np.int64)
-    known = key[row] == sought_key if len(key) else np.zeros(len(sought_key), dtype=bool)
-    return row, known
+    has_row = key[row] == sought_key if len(key) else np.zeros(len(sought_key), dtype=bool)
+    return row, has_row
 
 
 def with_curves(mesh: Mesh, facets: Ints, nodes: Lattice) -> Mesh:
@@ -293,25 +296,25 @@ def with_curves(mesh: Mesh, facets: Ints, nodes: Lattice) -> Mesh:
     conflicts = _meeting_sides(mesh, facets, side)
     row_of = np.full(len(mesh.facets), -1)
     row_of[numbers_of(mesh, facets)] = np.arange(len(facets))
-    groups, free = {}, np.ones(int(side.max()) + 1, dtype=bool)
+    groups, is_free = {}, np.ones(int(side.max()) + 1, dtype=bool)
     for name, members in mesh.facet_sets.items():
         row = row_of[numbers_of(mesh, members)]
         sides = np.unique(side[row]) if len(row) and (row >= 0).all() else np.zeros(0, np.int64)
         is_whole = len(row) == int(np.isin(side, sides).sum())
-        if name != "boundary" and is_whole and free[sides].all():
+        if name != "boundary" and is_whole and is_free[sides].all():
             if not conflicts[np.ix_(sides, sides)].any():
-                groups[name], free[sides] = sides, False
+                groups[name], is_free[sides] = sides, False
     facet_sets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
-    for sides in _groups_without_conflict(conflicts, np.nonzero(free)[0], np.bincount(side)):
+    for sides in _groups_without_conflict(conflicts, np.nonzero(is_free)[0], np.bincount(side)):
         number = 1
         while (name := _NAME.format(number)) in facet_sets:
             number += 1
         groups[name], facet_sets[name] = sides, facets[np.isin(side, sides)]
     curves = {}
     for name, sides in groups.items():
-        used, local = np.unique(pieces[np.isin(side, sides)], return_inverse=True)
+        point_numbers, local = np.unique(pieces[np.isin(side, sides)], return_inverse=True)
         curves[name] = CurvedFacets(
-            lock(nodes.points[used]), lock(local.reshape(-1, pieces.shape[1]))
+            lock(nodes.points[point_numbers]), lock(local.reshape(-1, pieces.shape[1]))
         )
     return sound_mesh(mesh.points, mesh.cells, facet_sets, mesh.cell_sets, curves)
 
@@ -322,8 +325,8 @@ def _bulge_of(nodes: Lattice) -> Floats:
     d = x.shape[2]
     corner = x[:, :d]
     size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    along = corner[:, 1:] - corner[:, :1]
-    normal = np.cross(along[:, 0], along[:, 1]) if d == 3 else along[:, 0, ::-1] * (1, -1)
+    edge = corner[:, 1:] - corner[:, :1]
+    normal = np.cross(edge[:, 0], edge[:, 1]) if d == 3 else edge[:, 0, ::-1] * (1, -1)
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     height = np.abs(np.einsum("kad,kd->ka", x - x[:, :1], normal))
     return np.asarray(height.max(axis=1) / size)
@@ -354,17 +357,23 @@ def _outward_normals(
     mesh: Mesh, facets: Ints, curve: CurvedFacets, owner: Ints, bary: Floats
 ) -> Floats:
     """Unit normals of pieces out of the body."""
-    along = curve.places(owner, bary)[1]
-    along = along[:, 1:] - along[:, :1]
-    normal = np.cross(along[:, 0], along[:, 1]) if mesh.dim == 3 else along[:, 0, ::-1] * (1, -1)
+    tangents = curve.places(owner, bary)[1]
+    tangents = tangents[:, 1:] - tangents[:, :1]
+    normal = (
+        np.cross(tangents[:, 0], tangents[:, 1])
+        if mesh.dim == 3
+        else tangents[:, 0, ::-1] * (1, -1)
+    )
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
     cell = mesh.facet_to_cell[numbers_of(mesh, facets), 0]
-    inward = mesh.points[mesh.cells[cell]].mean(axis=1) - mesh.points[facets].mean(axis=1)
+    towards_cell = mesh.points[mesh.cells[cell]].mean(axis=1) - mesh.points[facets].mean(axis=1)
     x = mesh.points[facets]
     edge = x[:, 1:] - x[:, :1]
-    straight = np.cross(edge[:, 0], edge[:, 1]) if mesh.dim == 3 else edge[:, 0, ::-1] * (1, -1)
-    turned = np.einsum("kd,kd->k", straight, inward) > 0
-    return np.asarray(np.where(turned[owner, None], -normal, normal))
+    straight_normal = (
+        np.cross(edge[:, 0], edge[:, 1]) if mesh.dim == 3 else edge[:, 0, ::-1] * (1, -1)
+    )
+    is_turned = np.einsum("kd,kd->k", straight_normal, towards_cell) > 0
+    return np.asarray(np.where(is_turned[owner, None], -normal, normal))
 
 
 def _meeting_sides(mesh: Mesh, facets: Ints, side: Ints) -> Bools:
@@ -375,15 +384,15 @@ def _meeting_sides(mesh: Mesh, facets: Ints, side: Ints) -> Bools:
     pairs = pairs[order]
     result = np.zeros((count, count), dtype=bool)
     for step in range(1, count):  # of the sides at a point, each with the one so many further on
-        same = pairs[step:, 1] == pairs[:-step, 1]
-        if not same.any():
+        is_same = pairs[step:, 1] == pairs[:-step, 1]
+        if not is_same.any():
             break
-        result[pairs[step:, 0][same], pairs[:-step, 0][same]] = True
+        result[pairs[step:, 0][is_same], pairs[:-step, 0][is_same]] = True
     x = mesh.points[facets]
     size = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max(axis=1)
-    row, near = pairs_within(cKDTree(x.mean(axis=1)), x.mean(axis=1), size)
-    other = side[row] != side[near]
-    result[side[row[other]], side[near[other]]] = True
+    row, partner = pairs_within(cKDTree(x.mean(axis=1)), x.mean(axis=1), size)
+    other = side[row] != side[partner]
+    result[side[row[other]], side[partner[other]]] = True
     return result | result.T
 
 

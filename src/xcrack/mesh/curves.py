@@ -26,12 +26,12 @@ _PASSES = 60
 _AT_REST = 1e-13  # of the longest edge: a move that is round-off
 
 
-def checked_curves(given: Any, facet_sets: Mapping[str, Ints]) -> dict[str, Curve]:
+def checked_curves(curves: Any, facet_sets: Mapping[str, Ints]) -> dict[str, Curve]:
     """Curves of a mesh as a dict.
 
     Parameters
     ----------
-    given : anything
+    curves : anything
     facet_sets : mapping of str to (k, d) array of int
 
     Raises
@@ -39,12 +39,12 @@ def checked_curves(given: Any, facet_sets: Mapping[str, Ints]) -> dict[str, Curv
     MeshError
         Not a mapping from names of facet sets to functions.
     """
-    if not isinstance(given, Mapping):
+    if not isinstance(curves, Mapping):
         raise MeshError(
             "curves: give a dict of names of facet sets and functions, such as curves={'hole': "
-            f"lambda x: ...}}, not {type(given).__name__}."
+            f"lambda x: ...}}, not {type(curves).__name__}."
         )
-    for name, curve in given.items():
+    for name, curve in curves.items():
         if name not in facet_sets:
             names = ", ".join(repr(n) for n in facet_sets)
             raise MeshError(f"curves: the mesh has no facet set {name!r}; it has {names}.")
@@ -53,7 +53,7 @@ def checked_curves(given: Any, facet_sets: Mapping[str, Ints]) -> dict[str, Curv
                 f"curves[{name!r}] is {type(curve).__name__}: give a function that returns the "
                 "nearest points of the curve (n, d) for points (n, d)."
             )
-    return dict(given)
+    return dict(curves)
 
 
 def check_on_curves(points: Floats, facet_sets: Mapping[str, Ints], curves: Curves) -> None:
@@ -91,8 +91,8 @@ def _reach(points: Floats, facets: Ints) -> Floats:
     return reach
 
 
-def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, most: float) -> Floats:
-    """Nearest points of a curve, no farther than `most` times the size of the facets there."""
+def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, far_ratio: float) -> Floats:
+    """Nearest points of a curve, no farther than `far_ratio` times the size of the facets there."""
     if not len(x):
         return x
     what = f"curves[{name!r}]"
@@ -103,7 +103,7 @@ def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, most: flo
         error=MeshError,
     )
     distance = np.linalg.norm(np.clip(result, -LARGEST, LARGEST) - x, axis=1)
-    is_far = distance > most * reach
+    is_far = distance > far_ratio * reach
     if is_far.any():
         i = int(np.argmax(np.where(is_far, distance, 0)))
         raise MeshError(
@@ -118,7 +118,7 @@ def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, most: flo
 def on_curves(
     points: Floats,
     cells: Ints,
-    new: Bools,
+    is_new: Bools,
     sets: Mapping[str, Ints],
     outer: Ints,
     curves: Curves,
@@ -133,7 +133,7 @@ def on_curves(
     ----------
     points : (n, d) array, length
     cells : (m, d + 1) array of int
-    new : (n,) array of bool
+    is_new : (n,) array of bool
         Points that may be moved.
     sets : mapping of str to (k, d) array of int
         Facets of the sets with a curve.
@@ -160,35 +160,37 @@ def on_curves(
     rows = [
         (name, curve, number)
         for name, facets in sets.items()
-        for curve, number in _curves_of_points(curves[name], facets, new)
+        for curve, number in _curves_of_points(curves[name], facets, is_new)
     ]
-    moving = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(row[2] for row in rows)]))
-    if not len(moving):
-        return points, np.zeros(len(points), dtype=bool), moving
-    plane, normal = _other_sides(points, moving, sets, outer)
+    moving_points = np.unique(
+        np.concatenate([np.zeros(0, dtype=np.int64), *(row[2] for row in rows)])
+    )
+    if not len(moving_points):
+        return points, np.zeros(len(points), dtype=bool), moving_points
+    plane, normal = _other_sides(points, moving_points, sets, outer)
     x = points.copy()
     for _ in range(_PASSES):
-        before = x[moving]
+        earlier_places = x[moving_points]
         for name, curve, number in rows:
             reach = np.full(len(number), size)
             x[number] = _nearest_points(name, curve, x[number], reach, _FARTHEST_NEW)
-        off = ((x[plane] - points[plane]) * normal).sum(axis=1)
-        x[plane] -= off[:, None] * normal
-        if (np.linalg.norm(x[moving] - before, axis=1) <= _AT_REST * size).all():
+        distance = ((x[plane] - points[plane]) * normal).sum(axis=1)
+        x[plane] -= distance[:, None] * normal
+        if (np.linalg.norm(x[moving_points] - earlier_places, axis=1) <= _AT_REST * size).all():
             break
-    moved = np.zeros(len(points), dtype=bool)
-    moved[moving] = (x[moving] != points[moving]).any(axis=1)
-    x, flat_points = _unfolded_points(points, x, cells, moved, outer)
+    is_moved = np.zeros(len(points), dtype=bool)
+    is_moved[moving_points] = (x[moving_points] != points[moving_points]).any(axis=1)
+    x, flat_points = _unfolded_points(points, x, cells, is_moved, outer)
     return x, np.asarray((x != points).any(axis=1)), flat_points
 
 
-def _curves_of_points(curve: Curve, facets: Ints, new: Bools) -> list[tuple[Curve, Ints]]:
+def _curves_of_points(curve: Curve, facets: Ints, is_new: Bools) -> list[tuple[Curve, Ints]]:
     """New points of a set with what they are put onto: its curve, or the border of that.
 
     A curve may have a `border`: that on which the points of edges lie that only one facet of the
     set has.
     """
-    number = np.unique(facets[new[facets]])
+    number = np.unique(facets[is_new[facets]])
     border: Curve | None = getattr(curve, "border", None)
     if border is None or facets.shape[1] < 3:
         return [(curve, number)]
@@ -199,27 +201,27 @@ def _curves_of_points(curve: Curve, facets: Ints, new: Bools) -> list[tuple[Curv
 
 
 def _other_sides(
-    points: Floats, new: Ints, sets: Mapping[str, Ints], outer: Ints
+    points: Floats, point_numbers: Ints, sets: Mapping[str, Ints], outer: Ints
 ) -> tuple[Ints, Floats]:
     """New points at a sharp edge to a side without a curve, and that side's normal."""
-    curved = np.unique(np.sort(np.concatenate(list(sets.values())), axis=1), axis=0)
-    every = np.concatenate([curved, np.sort(outer, axis=1)])
+    curved_facets = np.unique(np.sort(np.concatenate(list(sets.values())), axis=1), axis=0)
+    every = np.concatenate([curved_facets, np.sort(outer, axis=1)])
     _, start, count = np.unique(every, axis=0, return_index=True, return_counts=True)
-    flat = every[start[(count == 1) & (start >= len(curved))]]
+    flat_facets = every[start[(count == 1) & (start >= len(curved_facets))]]
     number = np.full(len(points), -1, dtype=np.int64)
-    number[new] = np.arange(len(new))
+    number[point_numbers] = np.arange(len(point_numbers))
     sides = []
-    for facets in (curved, flat):
-        mean = np.zeros((len(new), points.shape[1]))
-        touching = facets[(number[facets] >= 0).any(axis=1)]
-        vector = _normals(points[touching])
-        for column in touching.T:  # parts of a facet lie in one plane: any of them will do
+    for facets in (curved_facets, flat_facets):
+        mean = np.zeros((len(point_numbers), points.shape[1]))
+        touching_facets = facets[(number[facets] >= 0).any(axis=1)]
+        vector = _normals(points[touching_facets])
+        for column in touching_facets.T:  # parts of a facet lie in one plane: any of them will do
             at_new = number[column] >= 0
             mean[number[column[at_new]]] = vector[at_new]
         sides.append(mean)
     side_here, other = sides
-    has = (other != 0).any(axis=1) & (np.abs((side_here * other).sum(axis=1)) < _SHARP)
-    return new[has], other[has]
+    has_side = (other != 0).any(axis=1) & (np.abs((side_here * other).sum(axis=1)) < _SHARP)
+    return point_numbers[has_side], other[has_side]
 
 
 def _normals(corner: Floats) -> Floats:
@@ -232,49 +234,49 @@ def _normals(corner: Floats) -> Floats:
 
 
 def _unfolded_points(
-    points: Floats, target: Floats, cells: Ints, moved: Bools, outer: Ints
+    points: Floats, target: Floats, cells: Ints, is_moved: Bools, outer: Ints
 ) -> tuple[Floats, Ints]:
     """Points that are moved, and inner ones that follow where a cell would be folded or flattened.
 
     Points of the boundary stay where they were, and are returned as numbers, where that does not
     help: walls are thinner than the arc is high, say.
     """
-    x, moved, flat_points = target, moved.copy(), [np.zeros(0, dtype=np.int64)]
-    near = np.nonzero(moved[cells].any(axis=1))[0]
-    before, region = _volume(points[cells[near]]), np.zeros(0, dtype=np.int64)
+    x, is_moved, flat_points = target, is_moved.copy(), [np.zeros(0, dtype=np.int64)]
+    nearby_cells = np.nonzero(is_moved[cells].any(axis=1))[0]
+    earlier_volume, region = _volume(points[cells[nearby_cells]]), np.zeros(0, dtype=np.int64)
     while True:
         # Cells may still be of either orientation.
-        share = _volume(x[cells[near]]) / before
-        flat, folded = near[share < _FLAT], near[share < _FLATTEST]
-        if not len(folded) and (len(region) or not len(flat)):
+        share = _volume(x[cells[nearby_cells]]) / earlier_volume
+        flat_cells, folded_cells = nearby_cells[share < _FLAT], nearby_cells[share < _FLATTEST]
+        if not len(folded_cells) and (len(region) or not len(flat_cells)):
             return x, np.concatenate(flat_points)
-        if not np.isin(folded, region).all() or not len(region):
-            region = np.union1d(region, flat)
+        if not np.isin(folded_cells, region).all() or not len(region):
+            region = np.union1d(region, flat_cells)
             for _ in range(_LAYERS):
                 at_region = np.zeros(len(points), dtype=bool)
                 at_region[cells[region]] = True
                 region = np.nonzero(at_region[cells].any(axis=1))[0]
-            near = np.union1d(near, region)
-            before = _volume(points[cells[near]])
+            nearby_cells = np.union1d(nearby_cells, region)
+            earlier_volume = _volume(points[cells[nearby_cells]])
         else:
-            back = np.unique(cells[folded])
-            back = back[moved[back]]
-            if not len(back):  # only inner points fold it: none of them follows
-                back = np.unique(cells[region])
-                back = back[moved[back]]
-            moved[back] = False
-            flat_points.append(back)
-        x = np.where(moved[:, None], target, points)
+            points_back = np.unique(cells[folded_cells])
+            points_back = points_back[is_moved[points_back]]
+            if not len(points_back):  # only inner points fold it: none of them follows
+                points_back = np.unique(cells[region])
+                points_back = points_back[is_moved[points_back]]
+            is_moved[points_back] = False
+            flat_points.append(points_back)
+        x = np.where(is_moved[:, None], target, points)
         _let_follow(points, x, cells, region, outer)
 
 
 def _let_follow(points: Floats, x: Floats, cells: Ints, region: Ints, outer: Ints) -> None:
     """Move the inner points of a region by means of the moves around them (in place)."""
-    beyond = np.ones(len(cells), dtype=bool)
-    beyond[region] = False
+    is_beyond = np.ones(len(cells), dtype=bool)
+    is_beyond[region] = False
     is_free = np.zeros(len(points), dtype=bool)
     is_free[cells[region]] = True
-    is_free[cells[beyond]] = False
+    is_free[cells[is_beyond]] = False
     is_free[outer] = False
     number, corner = np.unique(cells[region], return_inverse=True)
     corner = corner.reshape(len(region), -1)
@@ -284,10 +286,10 @@ def _let_follow(points: Floats, x: Floats, cells: Ints, region: Ints, outer: Int
     rows, columns = np.concatenate([i, j]), np.concatenate([j, i])
     links = coo_array((np.tile(weight, 2), (rows, columns)), shape=(len(number),) * 2).tocsr()
     total = links.sum(axis=1)[:, None]
-    move, free = x[number] - points[number], is_free[number]
+    move, is_movable = x[number] - points[number], is_free[number]
     for _ in range(_SWEEPS):
-        move[free] = (links @ move / total)[free]
-    x[number[free]] = points[number[free]] + move[free]
+        move[is_movable] = (links @ move / total)[is_movable]
+    x[number[is_movable]] = points[number[is_movable]] + move[is_movable]
 
 
 def warn_of_flat_points(points: Floats, flat_points: Ints) -> None:

@@ -132,7 +132,7 @@ def notched_cylinder(
     )
     with session(Geometry__OCCUnionUnify=0, Mesh__OptimizeNetgen=1) as gmsh:
         # Without unifying, the fused bar keeps its patches apart.
-        gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, given: cell_size(x, z))
+        gmsh.model.mesh.setSizeCallback(lambda dim, tag, x, y, z, default: cell_size(x, z))
         try:
             _draw(
                 gmsh, radius / scale, [x / scale for x in sections], round_half / scale,
@@ -194,8 +194,8 @@ def _tetrahedra(gmsh: ModuleType) -> tuple[Floats, Ints]:
     corners = gmsh.model.mesh.getElementsByType(4)[1]
     number = np.full(int(tags.max()) + 1, -1, dtype=np.int64)
     number[tags] = np.arange(len(tags))
-    used, cells = np.unique(number[corners], return_inverse=True)
-    return coordinates.reshape(-1, 3)[used], cells.reshape(-1, 4)
+    point_numbers, cells = np.unique(number[corners], return_inverse=True)
+    return coordinates.reshape(-1, 3)[point_numbers], cells.reshape(-1, 4)
 
 
 def _with_sets(
@@ -231,8 +231,8 @@ def _with_sets(
     on_face = (abs(height) < tolerance).all(axis=-1)
     _, *limits = sections
     for station, (high, low) in (("outer", limits[:2]), ("inner", limits[2:])):
-        for side, along in (("left", -x), ("right", x)):
-            is_in_notch = ((along > low - tolerance) & (along < high + tolerance)).all(axis=1)
+        for side, position in (("left", -x), ("right", x)):
+            is_in_notch = ((position > low - tolerance) & (position < high + tolerance)).all(axis=1)
             for k in range(_FACES):
                 sets[f"{station}_{side}_{k:02d}"] = facets[is_in_notch & on_face[k]]
     return sound_mesh(points, cells, sets, curves={"round": round_side})
@@ -285,9 +285,9 @@ def _check_stations(
             inner_span - patch - 2 * mouth
         ),
     }
-    for between, gap in gaps.items():
+    for neighbours, gap in gaps.items():
         if gap <= 0:
             raise GeometryError(
-                f"no room ({gap / 2:g}) between {between}, or shorten patch_length = {patch:g}."
+                f"no room ({gap / 2:g}) between {neighbours}, or shorten patch_length = {patch:g}."
             )
     return gap / 2

@@ -24,7 +24,7 @@ def distance_to_simplices(x: Floats, corners: Floats) -> Floats:
     area = np.einsum("kd,kd->k", normal, normal)
     v = np.einsum("kd,kd->k", np.cross(b - a, x - a), normal) / area
     w = np.einsum("kd,kd->k", np.cross(x - a, c - a), normal) / area
-    inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+    is_inside = (v >= 0) & (w >= 0) & (v + w <= 1)
     plane = np.abs(np.einsum("kd,kd->k", x - a, normal)) / np.sqrt(area)
     edges = np.min(
         [
@@ -33,15 +33,15 @@ def distance_to_simplices(x: Floats, corners: Floats) -> Floats:
         ],
         axis=0,
     )
-    return np.where(inside, plane, edges)
+    return np.where(is_inside, plane, edges)
 
 
 def closest_on_segment(x: Floats, a: Floats, b: Floats) -> Floats:
     """Closest points on segments a b `(..., d)` to x."""
-    along = b - a
-    square = np.maximum((along * along).sum(axis=-1), 1e-300)
-    t = np.clip(((x - a) * along).sum(axis=-1) / square, 0, 1)
-    return np.asarray(a + t[..., None] * along)
+    edge = b - a
+    square = np.maximum((edge * edge).sum(axis=-1), 1e-300)
+    t = np.clip(((x - a) * edge).sum(axis=-1) / square, 0, 1)
+    return np.asarray(a + t[..., None] * edge)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +98,11 @@ def triangle_tree(points: Floats, triangles: Ints) -> TriangleTree:
     from xcrack.mesh.kernels.triangles import box_tree
 
     corners = np.ascontiguousarray(points[triangles])
-    tiny = _EQUAL * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    tolerance = _EQUAL * float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     boxes = box_tree(corners.min(axis=1), corners.max(axis=1))
     normal = face_normals(points, triangles)
     edge_normals, rim = _pseudo_normals(points, triangles, normal)
-    return TriangleTree(corners, normal, edge_normals, rim, boxes, tiny)
+    return TriangleTree(corners, normal, edge_normals, rim, boxes, tolerance)
 
 
 def _pseudo_normals(points: Floats, triangles: Ints, normal: Floats) -> tuple[Floats, Bools]:
@@ -147,24 +147,24 @@ def _in_parts(kernel: Callable[..., Any], x: Floats, *arguments: Any) -> tuple[A
         return tuple(kernel(x[first : first + _AT_ONCE], *arguments))
 
     parts = map_tasks(part, range(0, max(len(x), 1), _AT_ONCE))
-    return tuple(np.concatenate(some) for some in zip(*parts, strict=True))
+    return tuple(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
 
 
 def signed_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> tuple[Floats, Ints, Bools]:
     """What `surface_distance` gives, for a surface whose tree is there already."""
     x = np.asarray(x, dtype=float)
-    closest = closest_in(tree, x, band)
-    phi = np.array(closest.distance)
+    nearest_points = closest_in(tree, x, band)
+    phi = np.array(nearest_points.distance)
     on_boundary = np.zeros(len(phi), dtype=bool)
-    flat = np.nonzero((closest.triangle >= 0) & (closest.part == 0))[0]
-    t = closest.triangle[flat]
-    phi[flat] = np.einsum("ij,ij->i", x[flat] - tree.corners[t, 0], tree.normal[t])
-    edge = np.nonzero(closest.part > 0)[0]
-    t, part = closest.triangle[edge], closest.part[edge] - 1
-    side = np.einsum("ij,ij->i", x[edge] - closest.foot[edge], tree.feature_normals[t, part])
+    rows = np.nonzero((nearest_points.triangle >= 0) & (nearest_points.part == 0))[0]
+    t = nearest_points.triangle[rows]
+    phi[rows] = np.einsum("ij,ij->i", x[rows] - tree.corners[t, 0], tree.normal[t])
+    edge = np.nonzero(nearest_points.part > 0)[0]
+    t, part = nearest_points.triangle[edge], nearest_points.part[edge] - 1
+    side = np.einsum("ij,ij->i", x[edge] - nearest_points.foot[edge], tree.feature_normals[t, part])
     phi[edge] = np.copysign(phi[edge], side)
     on_boundary[edge] = tree.rim[t, part]
-    return phi, closest.triangle, on_boundary
+    return phi, nearest_points.triangle, on_boundary
 
 
 def surface_distance(
@@ -196,8 +196,8 @@ def surface_distance(
         The closest point lies on the boundary of the surface.
     """
     if not len(triangles):
-        none = np.full(len(x), -1)
-        return np.full(len(x), float(band)), none, np.zeros(len(x), dtype=bool)
+        no_triangle = np.full(len(x), -1)
+        return np.full(len(x), float(band)), no_triangle, np.zeros(len(x), dtype=bool)
     return signed_in(triangle_tree(points, triangles), x, band)
 
 
@@ -209,8 +209,8 @@ def corner_normals(points: Floats, triangles: Ints, normal: Floats | None = None
     for i in range(3):
         one = corners[:, (i + 1) % 3] - corners[:, i]
         other = corners[:, (i + 2) % 3] - corners[:, i]
-        spanned = np.linalg.norm(np.cross(one, other), axis=1)
-        angle = np.arctan2(spanned, np.einsum("ij,ij->i", one, other))
+        sine = np.linalg.norm(np.cross(one, other), axis=1)
+        angle = np.arctan2(sine, np.einsum("ij,ij->i", one, other))
         np.add.at(result, triangles[:, i], angle[:, None] * normal)
     return result
 
@@ -225,7 +225,7 @@ def first_crossing(tree: TriangleTree, start: Floats, stop: Floats) -> tuple[Int
 
 
 def front_distance(
-    x: Floats, polyline: Floats, closed: bool, band: float = np.inf
+    x: Floats, polyline: Floats, is_closed: bool, band: float = np.inf
 ) -> tuple[Floats, Ints, Floats]:
     """Distance of points to a polyline in 3D.
 
@@ -234,7 +234,7 @@ def front_distance(
     x : (n, 3) array, length
     polyline : (m, 3) array, length
         Distinct points; a closed one does not repeat its first point.
-    closed : bool
+    is_closed : bool
         Whether a last segment leads from the last point to the first.
     band : float, length
         Farther away nothing is sought.
@@ -253,7 +253,7 @@ def front_distance(
     polyline = np.array(polyline, dtype=float, order="C")
     stop = np.roll(polyline, -1, axis=0)
     start = polyline
-    if not closed:
+    if not is_closed:
         start, stop = np.ascontiguousarray(start[:-1]), np.ascontiguousarray(stop[:-1])
     tree = box_tree(np.minimum(start, stop), np.maximum(start, stop))
     x = np.array(x, dtype=float, order="C")

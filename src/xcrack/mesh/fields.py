@@ -62,9 +62,9 @@ class Field:
                 f"points (n, {self.mesh.dim})."
             )
         cell, bary = locate(self.mesh, x)
-        outside = np.nonzero(cell < 0)[0]
-        if len(outside):
-            cell[outside], bary[outside] = self._nearest_cells(x[outside])
+        rows_outside = np.nonzero(cell < 0)[0]
+        if len(rows_outside):
+            cell[rows_outside], bary[rows_outside] = self._nearest_cells(x[rows_outside])
         values = self.values[self.nodes[cell]]
         return np.asarray(np.einsum("qk,qk...->q...", self._shapes(bary), values))
 
@@ -84,12 +84,12 @@ class Field:
         mesh = self.mesh
         nearest = np.atleast_2d(mesh.cell_tree.query(x, k=min(_NEAR, len(mesh.cells)))[1])
         nearest = nearest.reshape(len(x), -1)
-        many = nearest.shape[1]
-        trial = barycentric(mesh, nearest.ravel(), np.repeat(x, many, axis=0))
+        count = nearest.shape[1]
+        trial = barycentric(mesh, nearest.ravel(), np.repeat(x, count, axis=0))
         trial = np.maximum(trial, 0.0)
         trial /= trial.sum(axis=1, keepdims=True)
         place = np.einsum("kb,kbd->kd", trial, mesh.points[mesh.cells[nearest.ravel()]])
-        distance = np.linalg.norm(place - np.repeat(x, many, axis=0), axis=1).reshape(-1, many)
+        distance = np.linalg.norm(place - np.repeat(x, count, axis=0), axis=1).reshape(-1, count)
         best = np.argmin(distance, axis=1)
         row = np.arange(len(x))
         cell = nearest[row, best]
@@ -103,7 +103,7 @@ class Field:
                 f"{at(mesh.points.min(axis=0))} to {at(mesh.points.max(axis=0))}). Check units and "
                 f"position, or give a field of the whole body."
             )
-        return cell, trial.reshape(len(x), many, -1)[row, best]
+        return cell, trial.reshape(len(x), count, -1)[row, best]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +126,9 @@ class CellField:
         """Values at points `(q, ...)`; `x` (q, d), length; beside the mesh those of a near cell."""
         x = numbers(x, f"{self.name}: x", (None, self.mesh.dim))
         cell, _ = locate(self.mesh, x)
-        outside = np.nonzero(cell < 0)[0]
-        if len(outside):
-            cell[outside] = self.mesh.cell_tree.query(x[outside])[1]
+        rows_outside = np.nonzero(cell < 0)[0]
+        if len(rows_outside):
+            cell[rows_outside] = self.mesh.cell_tree.query(x[rows_outside])[1]
         return np.asarray(self.values[cell])
 
     def __repr__(self) -> str:
@@ -270,9 +270,9 @@ def _values_of_shape(values: Any, n: int, top: int, source: str) -> Floats:
         return data[:, 0]
     if width in (2, 3) and width >= top:
         return data[:, :top]
-    full = {6: lambda: data[:, _SIX].reshape(n, 3, 3), 9: lambda: data.reshape(n, 3, 3)}
-    if width in full:
-        return np.asarray(full[width]()[:, :top, :top])
+    readers = {6: lambda: data[:, _SIX].reshape(n, 3, 3), 9: lambda: data.reshape(n, 3, 3)}
+    if width in readers:
+        return np.asarray(readers[width]()[:, :top, :top])
     if width == 4 and top < 3:
         return data.reshape(n, 2, 2)
     raise MeshError(
@@ -289,10 +289,10 @@ def _field(
     if len(second) == 1 and second <= {"triangle6", "tetra10"}:
         nodes = np.concatenate([data for _, data in blocks])
     else:
-        raw = _cells_as_simplices(RawMesh(points, blocks), name)
-        points = raw.points
+        raw_mesh = _cells_as_simplices(RawMesh(points, blocks), name)
+        points = raw_mesh.points
         kind = "tetra" if top > 2 else "triangle"
-        nodes = np.concatenate([data for k, data in raw.blocks if k == kind])
+        nodes = np.concatenate([data for k, data in raw_mesh.blocks if k == kind])
         if len(points) > n_given:
             values = _with_middles(values, nodes, n_given, len(points))
     if top < 3:
@@ -301,28 +301,28 @@ def _field(
             raise MeshError(f"{name}: the cells are a surface in 3D, not a body.")
         points = points[:, :2]
     x = points[nodes[:, : top + 1]]
-    turned = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
+    is_turned = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
     order = _TURNED.get(nodes.shape[1], [1, 0, *range(2, nodes.shape[1])])
-    nodes = np.where(turned[:, None], nodes[:, order], nodes)
-    used = np.unique(nodes)
-    is_infinite = ~np.isfinite(values[used].reshape(len(used), -1)).all(axis=1)
+    nodes = np.where(is_turned[:, None], nodes[:, order], nodes)
+    node_numbers = np.unique(nodes)
+    is_infinite = ~np.isfinite(values[node_numbers].reshape(len(node_numbers), -1)).all(axis=1)
     if is_infinite.any():
         raise MeshError(
-            f"{name}: the value at {at(points[used[np.argmax(is_infinite)]])} is not finite "
-            f"({int(is_infinite.sum())} such points)."
+            f"{name}: the value at {at(points[node_numbers[np.argmax(is_infinite)]])} is not "
+            f"finite ({int(is_infinite.sum())} such points)."
         )
     corners, cells = np.unique(nodes[:, : top + 1], return_inverse=True)
     mesh = sound_mesh(points[corners], cells.reshape(-1, top + 1))
     return Field(mesh, frozen_copy(nodes), frozen_copy(values), name)
 
 
-def _cells_as_simplices(raw: RawMesh, name: str) -> RawMesh:
+def _cells_as_simplices(raw_mesh: RawMesh, name: str) -> RawMesh:
     """Cells as simplices; how they are divided matters to nobody who interpolates."""
     from xcrack.base.errors import collected_warnings
 
     messages: list[str] = []
     with collected_warnings(messages):
-        result = linear_mesh(raw, name, strict=False)
+        result = linear_mesh(raw_mesh, name, strict=False)
     for message in messages:
         if "the sides are straight now" in message:
             warn(message)
@@ -331,12 +331,12 @@ def _cells_as_simplices(raw: RawMesh, name: str) -> RawMesh:
 
 def _with_middles(values: Floats, nodes: Ints, n_given: int, n: int) -> Floats:
     """Values with those of the points added in the middle of cells: means of their corners."""
-    added = np.zeros((n - n_given, *values.shape[1:]))
+    middle_values = np.zeros((n - n_given, *values.shape[1:]))
     count = np.zeros(n - n_given)
     for column in range(nodes.shape[1]):
         for other in range(nodes.shape[1]):
             rows = (nodes[:, column] >= n_given) & (nodes[:, other] < n_given)
-            np.add.at(added, nodes[rows, column] - n_given, values[nodes[rows, other]])
+            np.add.at(middle_values, nodes[rows, column] - n_given, values[nodes[rows, other]])
             np.add.at(count, nodes[rows, column] - n_given, 1)
-    added /= np.maximum(count, 1).reshape(-1, *[1] * (values.ndim - 1))
-    return np.concatenate([values, added])
+    middle_values /= np.maximum(count, 1).reshape(-1, *[1] * (values.ndim - 1))
+    return np.concatenate([values, middle_values])

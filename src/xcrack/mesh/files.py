@@ -112,15 +112,15 @@ def read_mesh(path: FileName, *, strict: Switch = False) -> Mesh:
     """
     path = existing_file(path, "mesh")
     with system_errors("cannot read the mesh file", path):
-        raw, uses = raw_mesh_of(path)
-    mesh = mesh_from_raw(linear_mesh(raw, path.name, strict), path.name)
+        raw_mesh, uses = raw_mesh_of(path)
+    mesh = mesh_from_raw(linear_mesh(raw_mesh, path.name, strict), path.name)
     parts = []
-    if ignored := missed_words(uses):
-        parts.append(f"the mesh and its sets are taken, not {', '.join(ignored)}")
+    if ignored_words := missed_words(uses):
+        parts.append(f"the mesh and its sets are taken, not {', '.join(ignored_words)}")
         if path.suffix.lower() == ".inp":
             parts[-1] += " (read_deck reads loads, supports and materials)"
-    if missed := sets_without_facets(raw, mesh):
-        parts.append(missed)
+    if message := sets_without_facets(raw_mesh, mesh):
+        parts.append(message)
     if parts:
         warn(f"{path.name}: {'; '.join(parts)}.")
     return with_stored_curves(mesh, path)
@@ -138,19 +138,19 @@ def raw_mesh_of(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
     return _raw_from_meshio(meshio_read(path, "mesh"), _gmsh_names(path)), []
 
 
-def sets_without_facets(raw: RawMesh, mesh: Mesh) -> str:
+def sets_without_facets(raw_mesh: RawMesh, mesh: Mesh) -> str:
     """Sets of nodes that hold no facet of the mesh, in words; empty where there are none."""
     names = [
         f"{name} ({len(members)} node" + ("s)" if len(members) > 1 else ")")
-        for name, members in raw.point_sets
+        for name, members in raw_mesh.point_sets
         if len(members) and name not in mesh.facet_sets and not name.startswith("_")
     ]
     if not names:
         return ""
-    more = f" and {len(names) - _MISSED_SETS} more" if len(names) > _MISSED_SETS else ""
+    remainder = f" and {len(names) - _MISSED_SETS} more" if len(names) > _MISSED_SETS else ""
     return (
-        f"the node sets {', '.join(names[:_MISSED_SETS])}{more} hold no facet of the boundary and "
-        "are left out: fix(...) takes points too"
+        f"the node sets {', '.join(names[:_MISSED_SETS])}{remainder} hold no facet of the boundary "
+        "and are left out: fix(...) takes points too"
     )
 
 
@@ -176,15 +176,15 @@ def read_triangles(path: str | PathLike[str]) -> tuple[Floats, Ints]:
     """
     path = existing_file(path, "surface")
     with system_errors("cannot read the surface file", path):
-        raw = meshio_read(path, "surface")
-    blocks = [block.data for block in raw.cells if block.type == "triangle"]
+        surface = meshio_read(path, "surface")
+    blocks = [block.data for block in surface.cells if block.type == "triangle"]
     if not blocks:
-        kinds = sorted({block.type for block in raw.cells})
+        kinds = sorted({block.type for block in surface.cells})
         raise GeometryError(
             f"surface file {str(path)!r} has no triangles, but {kinds or 'nothing'}: export the "
             "surface as linear triangles."
         )
-    points, triangles = np.asarray(raw.points, dtype=float), np.concatenate(blocks)
+    points, triangles = np.asarray(surface.points, dtype=float), np.concatenate(blocks)
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise GeometryError(
             f"surface file {str(path)!r}: a triangle names a point that the file lacks (it has "
@@ -372,25 +372,25 @@ _WIDTH = 76
 def _text_of_curves(mesh: Mesh, path: Path) -> str:
     """Curves of a mesh as text at the end of a file; those that it cannot hold are warned of."""
     frame = _FRAMES.get(path.suffix.lower())
-    content, lost = {}, []
+    content, lost_names = {}, []
     for name, curve in mesh.curves.items():
         if frame is not None and isinstance(curve, Arc):
             content[name] = {"arc": [list(curve.center), curve.radius, curve.axis]}
         elif frame is not None and isinstance(curve, CurvedFacets):
             content[name] = {"facets": [curve.points.tolist(), curve.facets.tolist()]}
         else:
-            lost.append(name)
-    if lost:
+            lost_names.append(name)
+    if lost_names:
         reason = (
             "functions of yours"
             if frame
             else f"{path.suffix} files carry none; write .msh, .inp or .vtu to keep them"
         )
-        warn(f"{path.name}: the curves of the sets {lost} are not stored ({reason}).")
+        warn(f"{path.name}: the curves of the sets {lost_names} are not stored ({reason}).")
     if not content or frame is None:
         return ""
-    packed = zlib.compress(json.dumps(content).encode())
-    text = base64.b64encode(packed).decode()
+    compressed_text = zlib.compress(json.dumps(content).encode())
+    text = base64.b64encode(compressed_text).decode()
     begin, at_line, end = frame
     lines = [at_line + text[i : i + _WIDTH] for i in range(0, len(text), _WIDTH)]
     return "\n".join([begin, *lines, end]) + "\n"
@@ -428,21 +428,21 @@ def with_stored_curves(mesh: Mesh, path: Path) -> Mesh:
         curves = _stored_curves(path)
     if not curves:
         return mesh
-    fitting, lost = {}, []
+    fitting, lost_names = {}, []
     for name, curve in curves.items():
         try:
             check_on_curves(mesh.points, mesh.facet_sets, {name: curve})
             fitting[name] = curve
         except (KeyError, MeshError):
-            lost.append(name)
-    if lost:
+            lost_names.append(name)
+    if lost_names:
         warn(
-            f"{path.name}: the curves of the sets {lost} do not fit the points there any more, and "
-            "are left out: the file was changed since it was written."
+            f"{path.name}: the curves of the sets {lost_names} do not fit the points there any "
+            "more, and are left out: the file was changed since it was written."
         )
-    named = {name: facets for name, facets in mesh.facet_sets.items() if name != "boundary"}
+    facet_sets = {name: facets for name, facets in mesh.facet_sets.items() if name != "boundary"}
     every = {**mesh.curves, **fitting}
-    return sound_mesh(mesh.points, mesh.cells, named, mesh.cell_sets, every)
+    return sound_mesh(mesh.points, mesh.cells, facet_sets, mesh.cell_sets, every)
 
 
 def _gmsh_names(path: Path) -> dict[tuple[int, int], str]:
@@ -466,9 +466,11 @@ def _gmsh_names(path: Path) -> dict[tuple[int, int], str]:
 def _raw_from_meshio(mesh: Any, names: dict[tuple[int, int], str]) -> RawMesh:
     blocks = [(block.type, np.asarray(block.data)) for block in mesh.cells]
     sets: list[tuple[str, str, Ints]] = []
-    tagged = {name for name, values in mesh.cell_data.items() if any(np.any(v) for v in values)}
-    tag_names = [name for name in _TAGS if name in tagged]
-    if not tag_names and not names and _ENTITY_TAGS in tagged:
+    tag_names_in_use = {
+        name for name, values in mesh.cell_data.items() if any(np.any(v) for v in values)
+    }
+    tag_names = [name for name in _TAGS if name in tag_names_in_use]
+    if not tag_names and not names and _ENTITY_TAGS in tag_names_in_use:
         tag_names = [_ENTITY_TAGS]
     base = [base_kind(kind) for kind, _ in blocks]
     top = max((SHAPES[shape].dim for shape in base if shape), default=0)

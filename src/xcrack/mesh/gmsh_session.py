@@ -123,7 +123,7 @@ def _open_session(gmsh: ModuleType, settings: Mapping[str, float]) -> Iterator[M
     if not guest:
         # interruptible=True would take over SIGINT for the rest of the process.
         gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
-    before = {name: gmsh.option.getNumber(name) for name in settings} if guest else {}
+    earlier_values = {name: gmsh.option.getNumber(name) for name in settings} if guest else {}
     host_model = gmsh.model.getCurrent() if guest else ""
     try:
         for name, value in settings.items():
@@ -136,7 +136,7 @@ def _open_session(gmsh: ModuleType, settings: Mapping[str, float]) -> Iterator[M
             gmsh.model.remove()
     finally:
         if guest:
-            for name, value in before.items():
+            for name, value in earlier_values.items():
                 gmsh.option.setNumber(name, value)
             gmsh.model.setCurrent(host_model)
         else:
@@ -204,10 +204,10 @@ def polylines(value: Any, what: str, error: type[XcrackError]) -> list[Floats]:
     [[[0.0, 0.0], [1.0, 0.0]]]
     """
     try:
-        many = bool(np.ndim(value[0][0]))
+        has_many = bool(np.ndim(value[0][0]))
         return [
             point_coordinates(path, what, (None, 2), error=error)
-            for path in (value if many else [value])
+            for path in (value if has_many else [value])
         ]
     except Exception as cause:  # whatever an object's own methods raise
         raise error(

@@ -64,12 +64,12 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
     centre = solution[:2]
     distance = np.linalg.norm(x - centre, axis=1)
     radius = float(distance.mean())
-    off = np.abs(distance - radius).max() / radius
+    deviation = np.abs(distance - radius).max() / radius
     hole = RoundHole(centre, section, radius)
-    if off > _ROUND:
+    if deviation > _ROUND:
         raise ProblemError(
-            f"{what}: the set is not a round hole: its points lie up to {100 * off:.3g} % of the "
-            f"radius {radius:.4g} off the best circle. Give the facets of one hole."
+            f"{what}: the set is not a round hole: its points lie up to {100 * deviation:.3g} % of "
+            f"the radius {radius:.4g} off the best circle. Give the facets of one hole."
         )
     middle = hole.local(mesh.points[facets].mean(axis=1))
     if (np.einsum("ks,ks->k", middle, area @ section.T) > 0).any():
@@ -91,11 +91,11 @@ def _straightened_axes(x: Floats, section: Floats) -> Floats:
         centre = np.linalg.lstsq(
             np.column_stack([2 * u, np.ones(len(u))]), (u**2).sum(axis=1), rcond=None
         )[0][:2]
-        radial = u - centre
-        distance = np.maximum(np.linalg.norm(radial, axis=1), 1e-300)
-        radial = radial / distance[:, None]
+        direction = u - centre
+        distance = np.maximum(np.linalg.norm(direction, axis=1), 1e-300)
+        direction = direction / distance[:, None]
         # Unknowns: shift of the centre, tilt of the axis, radius.
-        slope = np.column_stack([radial, w[:, None] * radial, np.ones(len(u))])
+        slope = np.column_stack([direction, w[:, None] * direction, np.ones(len(u))])
         tilt = np.linalg.lstsq(slope, distance, rcond=1e-10)[0][2:4]
         axis = axis + tilt @ section
         axis = axis / np.linalg.norm(axis)

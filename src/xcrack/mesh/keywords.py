@@ -142,19 +142,19 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
     if resolved_path in outer:
         raise MeshError(f"{path.name} includes itself: leave that *INCLUDE out.")
     keyword: Keyword | None = None
-    pending: tuple[int, str] | None = None  # a keyword line that goes on
+    open_line: tuple[int, str] | None = None  # a keyword line that goes on
     for number, line in enumerate(_lines(path), 1):
         text = line.strip()
         if not text or text.startswith("**"):
             continue
-        if pending is not None and _OPTION.match(text):
-            number, text = pending[0], pending[1] + text
-            pending = None
-        elif pending is not None:  # the comma at its end was one too many
+        if open_line is not None and _OPTION.match(text):
+            number, text = open_line[0], open_line[1] + text
+            open_line = None
+        elif open_line is not None:  # the comma at its end was one too many
             if keyword is not None:
                 yield from _complete_keyword(keyword, (*outer, resolved_path))
-            keyword = _keyword(pending[1], path, pending[0])
-            pending = None
+            keyword = _keyword(open_line[1], path, open_line[0])
+            open_line = None
         if not text.startswith("*"):
             if keyword is None:
                 raise MeshError(
@@ -164,15 +164,15 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
             keyword.data.append((number, text))
             continue
         if text.endswith(","):
-            pending = (number, text)
+            open_line = (number, text)
             continue
         if keyword is not None:
             yield from _complete_keyword(keyword, (*outer, resolved_path))
         keyword = _keyword(text, path, number)
-    if pending is not None:
+    if open_line is not None:
         if keyword is not None:
             yield from _complete_keyword(keyword, (*outer, resolved_path))
-        keyword = _keyword(pending[1].rstrip(","), path, pending[0])
+        keyword = _keyword(open_line[1].rstrip(","), path, open_line[0])
     if keyword is not None:
         yield from _complete_keyword(keyword, (*outer, resolved_path))
 
@@ -195,13 +195,13 @@ def _keyword(text: str, path: Path, line: int) -> Keyword:
 
 def _complete_keyword(keyword: Keyword, outer: tuple[Path, ...]) -> Iterator[Keyword]:
     """A keyword with the data of the file that it names, or the keywords of an included one."""
-    given = keyword.options.get("INPUT", "")
-    if not given:
+    input_name = keyword.options.get("INPUT", "")
+    if not input_name:
         if keyword.name == "INCLUDE":
             keyword.refuse("the parameter INPUT is missing: write *INCLUDE, INPUT=file.inp.")
         yield keyword
         return
-    inner = keyword.path.parent / given
+    inner = keyword.path.parent / input_name
     if not inner.is_file():
         keyword.refuse(
             f"the file {str(inner)!r} does not exist: put it beside {keyword.path.name}."

@@ -93,12 +93,12 @@ def base_kind(kind: str) -> str | None:
     return name.group(1) if name and name.group(1) in SHAPES else None
 
 
-def linear_mesh(raw: RawMesh, source: str, strict: bool) -> RawMesh:
+def linear_mesh(raw_mesh: RawMesh, source: str, strict: bool) -> RawMesh:
     """What a file holds with vertices, lines, triangles and tetrahedra only.
 
     Parameters
     ----------
-    raw : RawMesh
+    raw_mesh : RawMesh
         Elements of any kind; those of unknown kinds are left as they are.
     source : str
         Name of the file, for messages.
@@ -115,11 +115,11 @@ def linear_mesh(raw: RawMesh, source: str, strict: bool) -> RawMesh:
     MeshError
         Elements to change where `strict`, a damaged file, cells that are inside out.
     """
-    shapes = {kind: base for kind, _ in raw.blocks if (base := base_kind(kind)) is not None}
+    shapes = {kind: base for kind, _ in raw_mesh.blocks if (base := base_kind(kind)) is not None}
     other = {kind: base for kind, base in shapes.items() if kind not in _SIMPLICES}
-    counts = {k: sum(len(d) for kind, d in raw.blocks if kind == k) for k in other}
+    counts = {k: sum(len(d) for kind, d in raw_mesh.blocks if kind == k) for k in other}
     if not sum(counts.values()):
-        return raw
+        return raw_mesh
     if strict:
         content = ", ".join(f"{count} {kind}" for kind, count in counts.items() if count)
         raise MeshError(
@@ -128,42 +128,42 @@ def linear_mesh(raw: RawMesh, source: str, strict: bool) -> RawMesh:
             "1, Mesh.RecombineAll = 0; Abaqus: CPE3, CPS3, C3D4), or leave strict out: midside "
             "nodes are left out then and cells divided."
         )
-    _check_points(raw, source)
+    _check_points(raw_mesh, source)
     top = max(SHAPES[base].dim for base in shapes.values())
-    curved = [
-        _curved_edges(raw.points, kind, data, source)
-        for kind, data in raw.blocks
+    curved_blocks = [
+        _curved_edges(raw_mesh.points, kind, data, source)
+        for kind, data in raw_mesh.blocks
         if kind in other and SHAPES[other[kind]].dim == top and len(data)
     ]
-    pairs, middles, bulge = _joined_edges(curved)
-    entries = [*raw.blocks, *((kind, data) for kind, _, data in raw.sets)]
+    pairs, middles, bulge = _joined_edges(curved_blocks)
+    entries = [*raw_mesh.blocks, *((kind, data) for kind, _, data in raw_mesh.sets)]
     corners = [
         (shapes[kind], data[:, : SHAPES[shapes[kind]].corners]) if kind in other else (kind, data)
         for kind, data in entries
     ]
-    plane = _SOLIDS.isdisjoint(shapes.values()) and _is_plane(raw.points)
-    points, split = np.asarray(raw.points, dtype=float), dict[int, tuple[str, Ints]]()
+    plane = _SOLIDS.isdisjoint(shapes.values()) and _is_plane(raw_mesh.points)
+    points, split = np.asarray(raw_mesh.points, dtype=float), dict[int, tuple[str, Ints]]()
     for base in ("quad", "pyramid", "wedge", "hexahedron"):
         rows = [i for i, (kind, data) in enumerate(corners) if kind == base and len(data)]
         if not rows:
             continue
-        together = np.concatenate([corners[i][1] for i in rows]).astype(np.int64)
+        corner_numbers = np.concatenate([corners[i][1] for i in rows]).astype(np.int64)
         if base in _SOLIDS:
-            pieces, parent, points = _tetrahedra(points, together, base, source)
+            pieces, parent, points = _tetrahedra(points, corner_numbers, base, source)
         else:
-            pieces, parent = _triangles(points, together, plane, source)
+            pieces, parent = _triangles(points, corner_numbers, plane, source)
         begin = np.concatenate([[0], np.cumsum([len(corners[i][1]) for i in rows])])
         limits = np.searchsorted(parent, begin)
         kind = "tetra" if base in _SOLIDS else "triangle"
         for i, first, last in zip(rows, limits, limits[1:], strict=False):
             split[i] = (kind, pieces[first:last])
-    done = [split.get(i, entry) for i, entry in enumerate(corners)]
-    blocks = done[: len(raw.blocks)]
-    names = [name for _, name, _ in raw.sets]
-    sets = [(k, n, d) for n, (k, d) in zip(names, done[len(blocks) :], strict=True)]
+    all_entries = [split.get(i, entry) for i, entry in enumerate(corners)]
+    blocks = all_entries[: len(raw_mesh.blocks)]
+    names = [name for _, name, _ in raw_mesh.sets]
+    sets = [(k, n, d) for n, (k, d) in zip(names, all_entries[len(blocks) :], strict=True)]
     # An element may be in the file as part of the body and of sets: what was done is told once.
-    _tell(source, counts, shapes, blocks, bulge, len(points) - len(raw.points))
-    return RawMesh(points, blocks, sets, raw.point_sets, pairs, middles)
+    _tell(source, counts, shapes, blocks, bulge, len(points) - len(raw_mesh.points))
+    return RawMesh(points, blocks, sets, raw_mesh.point_sets, pairs, middles)
 
 
 def _is_plane(points: Floats) -> bool:
@@ -178,17 +178,17 @@ def _tell(
     shapes: dict[str, str],
     blocks: Sequence[tuple[str, Ints]],
     bulge: tuple[float, float],
-    added: int,
+    added_points: int,
 ) -> None:
     body = "tetra" if any(kind == "tetra" for kind, _ in blocks) else "triangle"
     top = SHAPES[body].dim
     total = sum(len(data) for kind, data in blocks if kind == body)
     dims = {kind: SHAPES[shapes[kind]].dim for kind in counts}
-    curved = sum(n for k, n in counts.items() if k != shapes[k] and dims[k] == top)
+    curved_count = sum(n for k, n in counts.items() if k != shapes[k] and dims[k] == top)
     parts = []
-    if curved:
+    if curved_count:
         parts.append(
-            f"the midside nodes of {curved} cells of second or higher order are left out ("
+            f"the midside nodes of {curved_count} cells of second or higher order are left out ("
             + (
                 f"the sides are straight now, which moves them by up to {bulge[1]:.3g}, "
                 f"{bulge[0]:.1%} of an edge; refine puts new points onto the curves of the boundary"
@@ -197,14 +197,14 @@ def _tell(
             )
             + "; Problem(order=2) puts functions of second order on the cells)"
         )
-    divided: dict[str, int] = {}
+    divided_counts: dict[str, int] = {}
     for kind, count in counts.items():
         base = shapes[kind]
         if dims[kind] == top and base not in _SIMPLICES and count:
-            divided[base] = divided.get(base, 0) + count
-    if divided:
-        content = ", ".join(f"{count} {_PLURAL[base]}" for base, count in divided.items())
-        middle = f", {added} of them from a point in their middle" if added else ""
+            divided_counts[base] = divided_counts.get(base, 0) + count
+    if divided_counts:
+        content = ", ".join(f"{count} {_PLURAL[base]}" for base, count in divided_counts.items())
+        middle = f", {added_points} of them from a point in their middle" if added_points else ""
         parts.append(f"{content} are divided{middle}")
     if parts:
         warn(
@@ -213,12 +213,12 @@ def _tell(
         )
 
 
-def _check_points(raw: RawMesh, source: str) -> None:
-    for kind, data in raw.blocks:
-        if base_kind(kind) and data.size and (data.min() < 0 or data.max() >= len(raw.points)):
+def _check_points(raw_mesh: RawMesh, source: str) -> None:
+    for kind, data in raw_mesh.blocks:
+        if base_kind(kind) and data.size and (data.min() < 0 or data.max() >= len(raw_mesh.points)):
             raise MeshError(
-                f"{source}: a cell names a point that the file lacks (it has {len(raw.points)} "
-                "points): the file is damaged."
+                f"{source}: a cell names a point that the file lacks (it has "
+                f"{len(raw_mesh.points)} points): the file is damaged."
             )
 
 
@@ -252,26 +252,26 @@ def _curved_edges(points: Floats, kind: str, data: Ints, source: str) -> _Curved
     middles = _middles(x[nodes], ends, slots)
     length = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
     _check_middles(middles, ends, length, data, source)
-    away = np.linalg.norm(middles - ends.mean(axis=2), axis=2)
-    share = away / np.maximum(length, np.finfo(float).tiny)
+    offset = np.linalg.norm(middles - ends.mean(axis=2), axis=2)
+    share = offset / np.maximum(length, np.finfo(float).tiny)
     worst = np.unravel_index(int(np.argmax(share)), share.shape)
     pairs = data[:, np.array(shape.edges)]
     faces = [face for face in shape.faces if len(face) == 4]
     if faces:
         corner = data[:, np.array(faces)]
         number = {frozenset(edge): k for k, edge in enumerate(shape.edges)}
-        around = [[number[frozenset((f[i], f[i - 1]))] for i in range(4)] for f in faces]
-        centre = middles[:, around].sum(axis=2) / 2 - x[corner].sum(axis=2) / 4
+        edges_around = [[number[frozenset((f[i], f[i - 1]))] for i in range(4)] for f in faces]
+        centre = middles[:, edges_around].sum(axis=2) / 2 - x[corner].sum(axis=2) / 4
         pairs = np.concatenate([pairs, corner[:, :, [0, 2]], corner[:, :, [1, 3]]], axis=1)
         middles = np.concatenate([middles, centre, centre], axis=1)
         both = x[pairs]
-        away = np.linalg.norm(middles - both.mean(axis=2), axis=2)
-        share = away / np.maximum(np.linalg.norm(both[:, :, 1] - both[:, :, 0], axis=2), 1e-300)
+        offset = np.linalg.norm(middles - both.mean(axis=2), axis=2)
+        share = offset / np.maximum(np.linalg.norm(both[:, :, 1] - both[:, :, 0], axis=2), 1e-300)
     is_curved = share > _STRAIGHT
-    listed = np.sort(pairs[is_curved], axis=1).astype(np.int64)
-    listed, first = np.unique(listed, axis=0, return_index=True)
-    largest = (float(share[worst]), float(away[worst])) if count else (0.0, 0.0)
-    return listed, middles[is_curved][first], largest
+    listed_pairs = np.sort(pairs[is_curved], axis=1).astype(np.int64)
+    listed_pairs, first = np.unique(listed_pairs, axis=0, return_index=True)
+    largest = (float(share[worst]), float(offset[worst])) if count else (0.0, 0.0)
+    return listed_pairs, middles[is_curved][first], largest
 
 
 def _order_of(kind: str, nodes: int) -> int:
@@ -288,12 +288,12 @@ def _nodes_of_edges(x: Floats, ends: Floats, order: int) -> list[list[int]] | No
     part = slice(None, None, max(1, len(x) // _SAMPLE))
     a, b = ends[part, None, :, 0], ends[part, None, :, 1]
     square = np.maximum(((b - a) ** 2).sum(axis=-1), np.finfo(float).tiny)
-    away = np.linalg.norm(x[part, :, None] - closest_on_segment(x[part, :, None], a, b), axis=-1)
-    off = np.median(away / np.sqrt(square), axis=0)
+    offset = np.linalg.norm(x[part, :, None] - closest_on_segment(x[part, :, None], a, b), axis=-1)
+    mean_offset = np.median(offset / np.sqrt(square), axis=0)
     if order == 2:  # beside the middle of an edge, not anywhere on it
         middle = np.linalg.norm(x[part, :, None] - (a + b) / 2, axis=-1)
-        off = np.median(middle / np.sqrt(square), axis=0)
-    edge = np.argmin(off, axis=1)
+        mean_offset = np.median(middle / np.sqrt(square), axis=0)
+    edge = np.argmin(mean_offset, axis=1)
     slots = [np.nonzero(edge == k)[0].tolist() for k in range(ends.shape[1])]
     return slots if all(len(each) == order - 1 for each in slots) else None
 
@@ -305,13 +305,15 @@ def _middles(x: Floats, ends: Floats, slots: list[list[int]]) -> Floats:
     for k, each in enumerate(slots):
         a, b = ends[:, k, 0], ends[:, k, 1]
         from_middle = np.linalg.norm(x[:, each] - ((a + b) / 2)[:, None], axis=2).mean(axis=0)
-        near = np.array(each)[np.argsort(from_middle, kind="stable")]
+        by_distance = np.array(each)[np.argsort(from_middle, kind="stable")]
         if order % 2 == 0:
-            result[:, k] = x[:, near[0]]
+            result[:, k] = x[:, by_distance[0]]
             continue
         t = (order - 1) / (2 * order)  # of the node before the middle, and 1 - t of that behind it
         outer = (0.5 - t) ** 2 / (2 * t * (1 - t))
-        result[:, k] = (0.5 + outer) * (x[:, near[0]] + x[:, near[1]]) - outer * (a + b)
+        result[:, k] = (0.5 + outer) * (x[:, by_distance[0]] + x[:, by_distance[1]]) - outer * (
+            a + b
+        )
     return result
 
 
@@ -319,12 +321,14 @@ def _check_middles(middles: Floats, ends: Floats, length: Floats, data: Ints, so
     """Refuse midside nodes that lie outside of their edge."""
     a, b = ends[:, :, 0], ends[:, :, 1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        along = ((middles - a) * (b - a)).sum(axis=2) / length**2
-        foot = a + along[..., None] * (b - a)
+        fraction = ((middles - a) * (b - a)).sum(axis=2) / length**2
+        foot = a + fraction[..., None] * (b - a)
         height = np.linalg.norm(middles - foot, axis=2) / length
     is_curved = height > _STRAIGHT
-    inside = np.where(is_curved, (along > 0.25) & (along < 0.75), (along > 0) & (along < 1))
-    is_wrong = ~(inside & (height < _HIGHEST)) & (length > 0)
+    is_between_ends = np.where(
+        is_curved, (fraction > 0.25) & (fraction < 0.75), (fraction > 0) & (fraction < 1)
+    )
+    is_wrong = ~(is_between_ends & (height < _HIGHEST)) & (length > 0)
     if is_wrong.any():
         cell, edge = np.argwhere(is_wrong)[0]
         raise MeshError(
@@ -354,36 +358,36 @@ def _fans(rows: Ints, faces: _Faces) -> Ints:
 
 def _proper_simplices(simplices: Ints) -> Bools:
     """Which simplices have no point twice: collapsed elements give such pieces."""
-    ordered = np.sort(simplices, axis=-1)
-    return np.asarray((np.diff(ordered, axis=-1) > 0).all(axis=-1))
+    sorted_corners = np.sort(simplices, axis=-1)
+    return np.asarray((np.diff(sorted_corners, axis=-1) > 0).all(axis=-1))
 
 
 def _tetrahedra(points: Floats, rows: Ints, base: str, source: str) -> tuple[Ints, Ints, Floats]:
     """Tetrahedra of cells, the cell of each (growing), and the points with those added."""
     triangles = _fans(rows, SHAPES[base].faces)
     pieces, keep = _cones(rows.min(axis=1), triangles)
-    folded = _folded_cells(points, pieces, keep)
-    if folded.any():
-        number = np.nonzero(folded)[0]
+    is_folded = _folded_cells(points, pieces, keep)
+    if is_folded.any():
+        number = np.nonzero(is_folded)[0]
         # A cell may be there several times, in the body and in sets: one point for all of them.
-        _unique, first, inverse = np.unique(
+        _rows, first, inverse = np.unique(
             np.sort(rows[number], axis=1), axis=0, return_index=True, return_inverse=True
         )
         middle = points[rows[number[first]]].mean(axis=1)
         centre = len(points) + inverse.ravel()
         points = np.concatenate([points, middle])
-        again, solid = _cones(centre, triangles[number])
-        wrong = _folded_cells(points, again, solid)
-        if wrong.any():
-            cell = rows[number[np.argmax(wrong)]]
-            different = len(np.unique(inverse.ravel()[wrong]))
+        cone_pieces, solid = _cones(centre, triangles[number])
+        is_wrong = _folded_cells(points, cone_pieces, solid)
+        if is_wrong.any():
+            cell = rows[number[np.argmax(is_wrong)]]
+            wrong_count = len(np.unique(inverse.ravel()[is_wrong]))
             raise MeshError(
                 f"{source}: the {base} with the corners {cell.tolist()} (numbers from 0) at "
                 f"{at(points[cell].mean(axis=0))} is turned inside out or twisted "
-                f"({different} such cells): its corners are in a wrong order, or it has no volume "
-                "in places. Mend it in the program that made the mesh."
+                f"({wrong_count} such cells): its corners are in a wrong order, or it has no "
+                "volume in places. Mend it in the program that made the mesh."
             )
-        pieces[number], keep[number] = again, solid
+        pieces[number], keep[number] = cone_pieces, solid
     parent, place = np.nonzero(keep)
     return pieces[parent, place], parent, points
 
@@ -400,10 +404,10 @@ def _folded_cells(points: Floats, pieces: Ints, keep: Bools) -> Bools:
     x = points[pieces]
     volume = np.where(keep, np.linalg.det(x[:, :, 1:] - x[:, :, :1]), np.nan)
     with np.errstate(all="ignore"):
-        most = np.nanmax(np.abs(volume), axis=1, initial=0.0)[:, None]
-        positive = ((volume > _FLAT * most) | ~keep).all(axis=1)
-        negative = ((volume < -_FLAT * most) | ~keep).all(axis=1)
-    return np.asarray(~(positive | negative))
+        largest_volume = np.nanmax(np.abs(volume), axis=1, initial=0.0)[:, None]
+        is_positive = ((volume > _FLAT * largest_volume) | ~keep).all(axis=1)
+        is_negative = ((volume < -_FLAT * largest_volume) | ~keep).all(axis=1)
+    return np.asarray(~(is_positive | is_negative))
 
 
 def _triangles(points: Floats, rows: Ints, plane: bool, source: str) -> tuple[Ints, Ints]:
@@ -417,20 +421,22 @@ def _triangles(points: Floats, rows: Ints, plane: bool, source: str) -> tuple[In
     pieces = ring[:, [[0, 1, 2], [0, 2, 3]]]
     keep = _proper_simplices(pieces)
     if plane:
-        turned = ring[:, [[1, 2, 3], [1, 3, 0]]]
-        also = _proper_simplices(turned)
-        quality = [_worst_shape(points, p, k) for p, k in ((pieces, keep), (turned, also))]
+        pieces_turned = ring[:, [[1, 2, 3], [1, 3, 0]]]
+        keep_turned = _proper_simplices(pieces_turned)
+        quality = [
+            _worst_shape(points, p, k) for p, k in ((pieces, keep), (pieces_turned, keep_turned))
+        ]
         other = quality[1] > quality[0] + 1e-9
         pieces, keep = (
-            np.where(other[:, None, None], turned, pieces),
-            np.where(other[:, None], also, keep),
+            np.where(other[:, None, None], pieces_turned, pieces),
+            np.where(other[:, None], keep_turned, keep),
         )
-        folded = np.maximum(*quality) <= 0
-        if folded.any():
-            cell = rows[np.argmax(folded)]
+        is_folded = np.maximum(*quality) <= 0
+        if is_folded.any():
+            cell = rows[np.argmax(is_folded)]
             raise MeshError(
                 f"{source}: the quadrilateral with the corners {cell.tolist()} (numbers from 0) "
-                f"at {at(points[cell].mean(axis=0))} crosses itself ({int(folded.sum())} such "
+                f"at {at(points[cell].mean(axis=0))} crosses itself ({int(is_folded.sum())} such "
                 "cells): its corners are in a wrong order. Mend it in the program that made the "
                 "mesh."
             )

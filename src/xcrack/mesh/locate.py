@@ -116,10 +116,10 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
             pairs.append(np.stack([ends[:-1], ends[1:]], axis=1))
             middle = (ends[:-1] + ends[1:]) / 2
             middles.append(p[first + k] + middle[:, None] * r[first + k])
-    inside = contains(mesh, np.concatenate(middles))
+    is_inside = contains(mesh, np.concatenate(middles))
     last = np.cumsum([len(each) for each in pairs])[:-1]
     return [
-        each[chunk_rows] for each, chunk_rows in zip(pairs, np.split(inside, last), strict=True)
+        each[chunk_rows] for each, chunk_rows in zip(pairs, np.split(is_inside, last), strict=True)
     ]
 
 
@@ -156,10 +156,10 @@ class Body:
         corner = mesh.points[facets]
         # Barycentric coordinates decrease towards the facet opposite to their corner.
         local = np.argmax(mesh.cell_to_facet[cell] == place[:, None], axis=1)
-        inward = mesh.gradient[cell, local]
+        inward_normal = mesh.gradient[cell, local]
         normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        turned = np.einsum("ij,ij->i", normal, inward) > 0
-        facets = np.where(turned[:, None], facets[:, ::-1], facets)
+        is_turned = np.einsum("ij,ij->i", normal, inward_normal) > 0
+        facets = np.where(is_turned[:, None], facets[:, ::-1], facets)
         size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
         return Body(mesh, triangle_tree(mesh.points, facets), size)
 

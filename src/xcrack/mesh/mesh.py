@@ -85,18 +85,20 @@ class Mesh:
         )
         for name, facets in facet_sets.items():
             self._check_facets(name, facets)
-        named = {name: frozen_copy(facets) for name, facets in facet_sets.items()}
-        named.setdefault("boundary", self.boundary)
+        frozen_sets = {name: frozen_copy(facets) for name, facets in facet_sets.items()}
+        frozen_sets.setdefault("boundary", self.boundary)
         sets = {name: frozen_copy(members) for name, members in cell_sets.items()}
-        object.__setattr__(self, "facet_sets", MappingProxyType(named))
+        object.__setattr__(self, "facet_sets", MappingProxyType(frozen_sets))
         object.__setattr__(self, "cell_sets", MappingProxyType(sets))
         curves = checked_curves(self.curves, self.facet_sets)
         object.__setattr__(self, "curves", MappingProxyType(curves))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        named = {name: facets for name, facets in self.facet_sets.items() if name != "boundary"}
+        given_sets = {
+            name: facets for name, facets in self.facet_sets.items() if name != "boundary"
+        }
         named_parts = (dict(self.cell_sets), dict(self.curves))
-        return sound_mesh, (self.points, self.cells, named, *named_parts)
+        return sound_mesh, (self.points, self.cells, given_sets, *named_parts)
 
     def __repr__(self) -> str:
         names = ", ".join(self.facet_sets)
@@ -158,8 +160,8 @@ class Mesh:
         for part in row_stretches(len(self.cells)):
             pairs = np.sort(self.cells[part][:, local], axis=2)
             key[part] = pairs[:, :, 0] * np.int64(self.n_points) + pairs[:, :, 1]
-        unique, inverse = np.unique(key, return_inverse=True)
-        edges = np.stack([unique // self.n_points, unique % self.n_points], axis=1)
+        edge_keys, inverse = np.unique(key, return_inverse=True)
+        edges = np.stack([edge_keys // self.n_points, edge_keys % self.n_points], axis=1)
         return lock(edges), lock(inverse.reshape(len(self.cells), len(local)))
 
     @cached_property
@@ -171,26 +173,28 @@ class Mesh:
         for part in row_stretches(len(self.cells)):
             facets = np.sort(self.cells[part][:, local], axis=2)
             key[part] = _scalar_key(facets.reshape(-1, d), self.n_points).reshape(-1, d + 1)
-        flat = key.ravel()
-        order = np.argsort(flat, kind="stable")
-        flat = flat[order]
-        begins = np.concatenate([[True], flat[1:] != flat[:-1]])
-        begin = np.nonzero(begins)[0]
-        counts = np.diff(np.append(begin, len(flat)))
+        facet_keys = key.ravel()
+        order = np.argsort(facet_keys, kind="stable")
+        facet_keys = facet_keys[order]
+        is_begin = np.concatenate([[True], facet_keys[1:] != facet_keys[:-1]])
+        begin = np.nonzero(is_begin)[0]
+        counts = np.diff(np.append(begin, len(facet_keys)))
         first = order[begin]
-        unique = np.sort(self.cells[first[:, None] // (d + 1), local[first % (d + 1)]], axis=1)
+        facet_corners = np.sort(
+            self.cells[first[:, None] // (d + 1), local[first % (d + 1)]], axis=1
+        )
         if counts.max(initial=0) > 2:
             raise MeshError(
-                f"facet {unique[np.argmax(counts)].tolist()} belongs to {counts.max()} cells, at "
-                "most two are possible: some cells are doubled or overlap; remove them."
+                f"facet {facet_corners[np.argmax(counts)].tolist()} belongs to {counts.max()} "
+                "cells, at most two are possible: some cells are doubled or overlap; remove them."
             )
         number = key.reshape(-1)
-        number[order] = np.cumsum(begins) - 1
+        number[order] = np.cumsum(is_begin) - 1
         cells_of = np.full((len(first), 2), -1, dtype=np.int64)
         cells_of[:, 0] = first // (d + 1)
         two = counts == 2
         cells_of[two, 1] = order[begin[two] + 1] // (d + 1)
-        return lock(unique), lock(cells_of), lock(key)
+        return lock(facet_corners), lock(cells_of), lock(key)
 
     @cached_property
     def facets(self) -> Ints:
@@ -268,9 +272,9 @@ class Mesh:
     @cached_property
     def point_to_cell(self) -> tuple[Ints, Ints]:
         """Cells around each point as offsets `(n + 1,)` and cell numbers."""
-        flat = self.cells.ravel()
-        order = np.argsort(flat, kind="stable")
-        counts = np.bincount(flat, minlength=self.n_points)
+        points = self.cells.ravel()
+        order = np.argsort(points, kind="stable")
+        counts = np.bincount(points, minlength=self.n_points)
         return lock(np.concatenate([[0], np.cumsum(counts)])), lock(order // (self.dim + 1))
 
     @cached_property
@@ -346,9 +350,9 @@ class Mesh:
                     )
                 members = np.nonzero(flags)[0]
             sets[name] = members
-        named = {name: f for name, f in self.facet_sets.items() if name != "boundary"}
+        given_sets = {name: f for name, f in self.facet_sets.items() if name != "boundary"}
         sets = checked_sets({}, sets, self.n_points, len(self.cells), self.dim)[1]
-        return sound_mesh(self.points, self.cells, named, sets, self.curves)
+        return sound_mesh(self.points, self.cells, given_sets, sets, self.curves)
 
     def _check_folds(self) -> None:
         """Cells on both sides of a facet must lie on different sides of it.
@@ -360,17 +364,17 @@ class Mesh:
         is_odd = np.empty(self.cell_to_facet.shape, dtype=bool)
         for part in row_stretches(len(is_odd)):
             a, b, *c = self.cells[part].T[local.T]
-            turned = (a > b) ^ (a > c[0]) ^ (b > c[0]) if c else a > b
-            turned[1::2] ^= True  # the corner across counts too
-            is_odd[part] = turned.T
-        odd = np.bincount(self.cell_to_facet.ravel(), is_odd.ravel(), len(self.facets))
-        folded = np.nonzero((odd != 1) & (self.facet_to_cell[:, 1] >= 0))[0]
-        if len(folded):
-            one, other = self.facet_to_cell[folded[0]].tolist()
+            is_turned = (a > b) ^ (a > c[0]) ^ (b > c[0]) if c else a > b
+            is_turned[1::2] ^= True  # the corner across counts too
+            is_odd[part] = is_turned.T
+        balance = np.bincount(self.cell_to_facet.ravel(), is_odd.ravel(), len(self.facets))
+        folded_facets = np.nonzero((balance != 1) & (self.facet_to_cell[:, 1] >= 0))[0]
+        if len(folded_facets):
+            one, other = self.facet_to_cell[folded_facets[0]].tolist()
             where = np.round(self.points[self.cells[other]].mean(axis=0), 6).tolist()
             raise MeshError(
                 f"cell {other} at {where} is inverted: it folds over its neighbour {one} "
-                f"({len(folded)} such pairs). Move its points back or remesh."
+                f"({len(folded_facets)} such pairs). Move its points back or remesh."
             )
 
     def _check_facets(self, name: str, facets: Ints) -> None:

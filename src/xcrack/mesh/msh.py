@@ -59,10 +59,10 @@ def _groups(
     member = np.zeros((count, len(names)), dtype=bool)
     for column, rows in enumerate(sets.values()):
         member[rows, column] = True
-    alone = ~member.any(axis=1)
-    if with_rest and alone.any():
+    is_alone = ~member.any(axis=1)
+    if with_rest and is_alone.any():
         names.append(REST)
-        member = np.column_stack([member, alone])
+        member = np.column_stack([member, is_alone])
     rows = np.flatnonzero(member.any(axis=1))
     if not len(rows):
         return names, []
@@ -84,8 +84,8 @@ def _names(names: list[tuple[int, int, str]]) -> Iterable[str]:
 
 def _coordinates(mesh: Mesh) -> list[str]:
     # repr is the shortest text that gives the same number again.
-    flat = " 0" * (3 - mesh.dim)
-    return [" ".join(map(repr, x)) + flat for x in mesh.points.tolist()]
+    third = " 0" * (3 - mesh.dim)
+    return [" ".join(map(repr, x)) + third for x in mesh.points.tolist()]
 
 
 def _version_4(mesh: Mesh, entities: list[Entity]) -> Iterable[str]:

@@ -154,14 +154,14 @@ def _sets_by_property(
 
 def _nodes(card: Card) -> tuple[str, list[int]]:
     """Kind of an element, and its nodes in VTK's order: all of them, or its corners alone."""
-    plain, full = _ELEMENTS[card.name]
-    n, n_full = SHAPES[plain].corners, _NODES.get(full, 0)
+    kind, full_kind = _ELEMENTS[card.name]
+    n, n_full = SHAPES[kind].corners, _NODES.get(full_kind, 0)
     middles = card.fields[2 + n : 2 + n_full]
     is_full = bool(middles) and len(middles) == n_full - n and all(middles)
     count = n_full if is_full else n
     nodes = [card.whole_number(2 + k, f"the numbers of its {count} nodes") for k in range(count)]
-    order = _ORDER.get(full) if is_full else None
-    return (full if is_full else plain), nodes if order is None else [nodes[k] for k in order]
+    order = _ORDER.get(full_kind) if is_full else None
+    return (full_kind if is_full else kind), nodes if order is None else [nodes[k] for k in order]
 
 
 def _use(path: Path, name: str, count: int, line: int) -> KeywordUse:
@@ -212,25 +212,25 @@ def _fields(text: str) -> tuple[str, list[str], int]:
 
 def _lines(path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, int, str]]:
     """Lines with file and number, without comments, those of included files in place."""
-    here = path.resolve()
-    if here in outer or len(outer) > _DEEPEST:
+    path_here = path.resolve()
+    if path_here in outer or len(outer) > _DEEPEST:
         raise MeshError(f"{path.name} includes itself: leave that INCLUDE out.")
     content = path.read_text(encoding="utf-8", errors="replace").expandtabs(8)
     for number, line in enumerate(content.splitlines(), 1):
         text = line.split("$")[0].rstrip()
         if not text.strip():
             continue
-        given = re.fullmatch(r"\s*INCLUDE\s+['\"]?([^'\"]+)['\"]?\s*", text, re.I)
-        if given is None:
+        include = re.fullmatch(r"\s*INCLUDE\s+['\"]?([^'\"]+)['\"]?\s*", text, re.I)
+        if include is None:
             yield path, number, text
             continue
-        target = path.parent / given[1].strip()
+        target = path.parent / include[1].strip()
         if not target.is_file():
             raise MeshError(
                 f"{path.name}, line {number}: INCLUDE: there is no file {str(target)!r}: "
                 "put it there (paths begin at the file that names it)."
             )
-        yield from _lines(target, (*outer, here))
+        yield from _lines(target, (*outer, path_here))
 
 
 __all__ = ["read_nastran"]

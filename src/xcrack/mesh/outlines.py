@@ -80,16 +80,16 @@ class Side:
             for a, b, turn in zip(corners, corners[1:], turns, strict=False)
         ]
 
-    def parts(self, most: float) -> list["Side"]:
+    def parts(self, largest_turn: float) -> list["Side"]:
         """It in equal parts that turn by no more than an angle each."""
-        n = max(ceil(abs(self.turn) / most - 1e-9), 1)
+        n = max(ceil(abs(self.turn) / largest_turn - 1e-9), 1)
         return self.cut_at((np.arange(1, n) / n).tolist())
 
     def crossings(self, axis: int, value: float) -> list[float]:
         """Shares of its length at which a coordinate has a value."""
         if self.center is None:
-            along = self.end[axis] - self.start[axis]
-            return [(value - self.start[axis]) / along] if along else []
+            extent = self.end[axis] - self.start[axis]
+            return [(value - self.start[axis]) / extent] if extent else []
         height = (value - self.center[axis]) / self.radius
         if abs(height) > 1:
             return []
@@ -168,24 +168,24 @@ def _is_first(sides: Sequence[Side], end: Floats, size: float) -> bool:
 def _entries(outline: Any) -> list[Floats]:
     """Points of each entry: one, or two of an arc."""
     try:
-        given = list(outline)
-        nested = [bool(np.ndim(entry[0])) for entry in given]
+        entries = list(outline)
+        is_nested = [bool(np.ndim(entry[0])) for entry in entries]
     except Exception:  # whatever an object's own methods raise
         return []
     return [
-        point_coordinates(entry if many else [entry], "outline", (2 if many else 1, 2),
+        point_coordinates(entry if has_many else [entry], "outline", (2 if has_many else 1, 2),
                     error=GeometryError)
-        for entry, many in zip(given, nested, strict=True)
+        for entry, has_many in zip(entries, is_nested, strict=True)
     ]  # fmt: skip
 
 
-def _arc(start: Floats, through: Floats, end: Floats) -> tuple[Point, float]:
+def _arc(start: Floats, middle: Floats, end: Floats) -> tuple[Point, float]:
     """Centre and angle of an arc through a point; a full circle where it comes back."""
-    a, b = through - start, end - start
+    a, b = middle - start, end - start
     area = 2 * (a[0] * b[1] - a[1] * b[0])
     if abs(area) <= 1e-9 * max(float(a @ a), float(b @ b)):
         raise GeometryError(
-            f"outline: the points {at(start)}, {at(through)} and {at(end)} of an arc lie on one "
+            f"outline: the points {at(start)}, {at(middle)} and {at(end)} of an arc lie on one "
             "line: give a point beside it, or a straight side."
         )
     x = (b[1] * (a @ a) - a[1] * (b @ b)) / area
@@ -240,8 +240,8 @@ def distance_to(sides: Sequence[Side], x: Point) -> float:
         ends = [hypot(x[0] - p[0], x[1] - p[1]) for p in (side.start, side.end)]
         if side.center is None:
             a, b = np.array(side.start), np.array(side.end)
-            along = (b - a) / hypot(*(b - a))
-            t = float(np.clip((np.array(x) - a) @ along / hypot(*(b - a)), 0, 1))
+            direction = (b - a) / hypot(*(b - a))
+            t = float(np.clip((np.array(x) - a) @ direction / hypot(*(b - a)), 0, 1))
             foot = a + t * (b - a)
             best = min(best, hypot(x[0] - foot[0], x[1] - foot[1]))
             continue
@@ -274,8 +274,8 @@ def finer_at_arcs(
         return size
 
     def finer_spacing(x: float, y: float) -> float:
-        near = min(h + slope * hypot(x - a, y - b) for a, b, h in spots)
-        return min(size(x, y), near)
+        near_spots = min(h + slope * hypot(x - a, y - b) for a, b, h in spots)
+        return min(size(x, y), near_spots)
 
     return finer_spacing
 

@@ -64,8 +64,10 @@ def part(
     except ProblemError as error:
         raise MeshError(str(error)) from None
     chosen = chosen_facets(mesh.points, facets, where, f"part {name!r}")
-    named = {n: f for n, f in mesh.facet_sets.items() if n != "boundary"}
-    return sound_mesh(mesh.points, mesh.cells, {**named, name: chosen}, mesh.cell_sets, mesh.curves)
+    facet_sets = {n: f for n, f in mesh.facet_sets.items() if n != "boundary"}
+    return sound_mesh(
+        mesh.points, mesh.cells, {**facet_sets, name: chosen}, mesh.cell_sets, mesh.curves
+    )
 
 
 def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints:
@@ -88,12 +90,12 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
     shares = _shares(points.shape[1])
     samples = [np.einsum("b,kbd->kd", share, points[facets]) for share in shares]
     area = sum(float(size @ is_inside(x)) for x in samples) / len(shares)
-    given = float(size[chosen].sum())
-    if abs(given - area) > _ENDS * given:
+    facet_area = float(size[chosen].sum())
+    if abs(facet_area - area) > _ENDS * facet_area:
         warn(
-            f"{what} has facets of {given:.4g} in all, where {area:.4g} lie within what was asked "
-            "for: its ends lie within facets. Refine the mesh there, or put points of the mesh at "
-            "the ends."
+            f"{what} has facets of {facet_area:.4g} in all, where {area:.4g} lie within what was "
+            "asked for: its ends lie within facets. Refine the mesh there, or put points of the "
+            "mesh at the ends."
         )
     return facets[chosen]
 
@@ -126,8 +128,8 @@ def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
             f"{what}: {value_text(where)}: give a function f(x) -> bools, or two corners of "
             f"{dim} numbers each, None where the box has no end."
         )
-    given = [[0.0 if v is None else v for v in corner] for corner in corners]
-    rows = numbers(given, f"{what}: corners of the box", (2, dim), error=MeshError)
+    padded = [[0.0 if v is None else v for v in corner] for corner in corners]
+    rows = numbers(padded, f"{what}: corners of the box", (2, dim), error=MeshError)
     is_open = np.array([[v is None for v in corner] for corner in corners])
     lower, upper = np.where(is_open, [[-np.inf], [np.inf]], rows)
     if (lower > upper).any():
@@ -140,17 +142,17 @@ def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
 def _values_at(function: Callable[[Floats], Any], x: Floats, what: str) -> Bools:
     result = call_function(function, f"the choice of {what}", x.copy())
     try:
-        inside = np.asarray(result)
+        is_inside = np.asarray(result)
     except Exception as error:  # ragged rows, or what an object's own __array__ raises
         raise MeshError(
             f"{what}: the function returned {value_text(result)}: return one bool for each point."
         ) from error
-    if inside.shape != (len(x),) or inside.dtype != bool:
+    if is_inside.shape != (len(x),) or is_inside.dtype != bool:
         raise MeshError(
-            f"{what}: the function returned shape {inside.shape} of {inside.dtype} for {len(x)} "
-            "points: return one bool for each."
+            f"{what}: the function returned shape {is_inside.shape} of {is_inside.dtype} for "
+            f"{len(x)} points: return one bool for each."
         )
-    return inside
+    return is_inside
 
 
 def _sizes(corners: Floats) -> Floats:
@@ -167,8 +169,8 @@ def _shares(dim: int) -> Floats:
     if dim == 2:
         return np.stack([1 - s, s], axis=1)
     a, b = (v.ravel() for v in np.meshgrid(s, s))
-    inside = a + b < 1
-    return np.stack([1 - a - b, a, b], axis=1)[inside]
+    is_inside = a + b < 1
+    return np.stack([1 - a - b, a, b], axis=1)[is_inside]
 
 
 __all__ = ["Where", "box_of", "chosen_facets", "part"]

@@ -218,8 +218,8 @@ def plate(
             sets={"crown": ((-2, None), (2, None)), "base": [0]},
         )
     """
-    given = cast(list[Hole], holes)
-    names = [f"hole_{i}" for i in range(len(given))]
+    round_holes = cast(list[Hole], holes)
+    names = [f"hole_{i}" for i in range(len(round_holes))]
     if outline is not None and width is None and height is None:
         sides = cast(list[Side], outline)
     elif outline is None and width is not None and height is not None:
@@ -228,7 +228,7 @@ def plate(
         raise GeometryError(
             "plate: give width and height of a rectangle, or an outline; not both, not neither."
         )
-    return _plate(sides, given, names, size, size_near, along, band, transition, sets)
+    return _plate(sides, round_holes, names, size, size_near, along, band, transition, sets)
 
 
 def _plate(
@@ -270,9 +270,9 @@ def _plate(
     )
     scaled_sides = [_scaled_side(side, scale) for side in parts]
     length = finer_at_arcs(length, scaled_sides, _FEWEST_HOLE_EDGES, _STEEPEST)
-    scaled = [((x / scale, y / scale), r / scale) for (x, y), r in holes]
+    scaled_holes = [((x / scale, y / scale), r / scale) for (x, y), r in holes]
     with session() as gmsh:
-        curves = _draw(gmsh, scaled_sides, scaled, names, near_size / scale)
+        curves = _draw(gmsh, scaled_sides, scaled_holes, names, near_size / scale)
         points, cells, facets = mesh_model(gmsh, curves, length)
     rims: dict[str, Arc] = {
         name: Arc(center, radius) for name, (center, radius) in zip(names, holes)
@@ -387,10 +387,14 @@ def mesh_model(
         for name, tags in curves.items()
     }
     # Centres of arcs are nodes of the model, but of no cell.
-    used = np.unique(cells)
-    new = np.full(len(points), -1, dtype=np.int64)
-    new[used] = np.arange(len(used))
-    return points[used], new[cells], {name: new[edges] for name, edges in facets.items()}
+    point_numbers = np.unique(cells)
+    new_number = np.full(len(points), -1, dtype=np.int64)
+    new_number[point_numbers] = np.arange(len(point_numbers))
+    return (
+        points[point_numbers],
+        new_number[cells],
+        {name: new_number[edges] for name, edges in facets.items()},
+    )
 
 
 def _finish(
@@ -403,24 +407,24 @@ def _finish(
 ) -> Mesh:
     """Put the nodes of the sides exactly onto them, name and order the sets."""
     of_sides = [facets.pop(f"side {n}") for n in range(len(sides))]
-    named: dict[str, list[Ints]] = {}
+    edges_by_name: dict[str, list[Ints]] = {}
     for side, edges in zip(sides, of_sides, strict=True):
         for axis in (0, 1) if side.center is None else ():
             if side.start[axis] == side.end[axis]:
                 points[edges.ravel(), axis] = side.start[axis]
         if side.name:
-            named.setdefault(side.name, []).append(edges)
-    first = [name for name in ("left", "right", "bottom", "top") if name in named]
-    order = dict.fromkeys([*first, *named])
-    facet_sets = {name: np.concatenate(named[name]) for name in order} | facets
+            edges_by_name.setdefault(side.name, []).append(edges)
+    first = [name for name in ("left", "right", "bottom", "top") if name in edges_by_name]
+    order = dict.fromkeys([*first, *edges_by_name])
+    facet_sets = {name: np.concatenate(edges_by_name[name]) for name in order} | facets
     outer = np.concatenate([*of_sides, *facets.values()])
     for name, where in sets.items():
         if callable(where) or not _are_numbers(where):
             facet_sets[name] = chosen_facets(points, outer, where, f"sets[{name!r}]")
             continue
         numbers = whole_numbers(where, f"sets[{name!r}]", (None,), error=MeshError).tolist()
-        unknown = sorted(set(numbers) - {side.number for side in sides})
-        if unknown or not numbers:
+        strange_numbers = sorted(set(numbers) - {side.number for side in sides})
+        if strange_numbers or not numbers:
             last = max(side.number for side in sides)
             raise MeshError(
                 f"sets[{name!r}] = {value_text(where)}: the sides have the numbers 0 to {last}: "
@@ -444,9 +448,9 @@ def _checked_sets(sets: Any, names: Sequence[str]) -> Sets:
             "sets must be a dict of names and parts of the boundary, such as sets={'grip': "
             f"((0, 0), (10, 0))}}, not {value_text(sets)}."
         )
-    taken = sorted({*sets} & {*names, "boundary"})
-    if taken:
-        raise MeshError(f"sets: the plate has {taken[0]!r} by itself: give another name.")
+    taken_names = sorted({*sets} & {*names, "boundary"})
+    if taken_names:
+        raise MeshError(f"sets: the plate has {taken_names[0]!r} by itself: give another name.")
     return sets
 
 
@@ -493,10 +497,10 @@ def _check_cost(
 ) -> None:
     run = sum(float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths)
     cell = 3**0.5 / 2
-    fine = min(2 * band * run, width * height)
+    fine_area = min(2 * band * run, width * height)
     points = inf  # also where squares of sizes are too small for a number
     if near_size > FINEST * max(width, height):
-        points = width * height / (cell * size**2) + fine / (cell * near_size**2)
+        points = width * height / (cell * size**2) + fine_area / (cell * near_size**2)
     if points > _MOST_POINTS:
         raise GeometryError(
             f"size = {size:g} and size_near = {near_size:g} ask for about {points:.1e} points, "

@@ -18,34 +18,36 @@ def ear_clipped(polygon: Floats) -> Ints:
 
     The best-shaped ear is cut first.
     """
-    remaining = list(range(len(polygon)))
+    rest = list(range(len(polygon)))
     triangles = []
-    while len(remaining) > 3:
+    while len(rest) > 3:
         best, where = -np.inf, -1
-        remaining_polygon = polygon[remaining]
-        before, after = (
+        remaining_polygon = polygon[rest]
+        previous_corner, next_corner = (
             np.roll(remaining_polygon, 1, axis=0),
             np.roll(remaining_polygon, -1, axis=0),
         )
-        area = cross(remaining_polygon - before, after - remaining_polygon)
+        area = cross(remaining_polygon - previous_corner, next_corner - remaining_polygon)
         for k in np.nonzero(area > 0)[0]:
-            a, b, c = before[k], remaining_polygon[k], after[k]
-            within = (
+            a, b, c = previous_corner[k], remaining_polygon[k], next_corner[k]
+            is_within = (
                 (cross(b - a, remaining_polygon - a) >= 0)
                 & (cross(c - b, remaining_polygon - b) >= 0)
                 & (cross(a - c, remaining_polygon - c) >= 0)
             )
-            within &= (np.abs(remaining_polygon[:, None] - [a, b, c]).max(axis=2) > 0).all(axis=1)
+            is_within &= (np.abs(remaining_polygon[:, None] - [a, b, c]).max(axis=2) > 0).all(
+                axis=1
+            )
             longest = max(np.sum((b - a) ** 2), np.sum((c - b) ** 2), np.sum((a - c) ** 2))
-            if not within.any() and area[k] / longest > best:
+            if not is_within.any() and area[k] / longest > best:
                 best, where = float(area[k] / longest), int(k)
         if where < 0:
             # Only points on one line are left over at this end; they hold no area.
             where = int(np.argmin(np.abs(area)))
-        n = len(remaining)
-        triangles.append((remaining[where - 1], remaining[where], remaining[(where + 1) % n]))
-        del remaining[where]
-    triangles.append((remaining[0], remaining[1], remaining[2]))
+        n = len(rest)
+        triangles.append((rest[where - 1], rest[where], rest[(where + 1) % n]))
+        del rest[where]
+    triangles.append((rest[0], rest[1], rest[2]))
     return np.array(triangles, dtype=np.int64)
 
 
@@ -77,17 +79,17 @@ def _in_circle(p: Floats, q: Floats, a: Floats, b: Floats) -> bool:
     for corner in (a, b):
         one, other = p - corner, q - corner
         angles.append(abs(np.arctan2(cross(one, other), one @ other)))
-    convex = cross(b - p, a - p) > 0 and cross(a - q, b - q) > 0
-    return bool(convex and sum(angles) > np.pi * (1 + 1e-9))
+    is_convex = cross(b - p, a - p) > 0 and cross(a - q, b - q) > 0
+    return bool(is_convex and sum(angles) > np.pi * (1 + 1e-9))
 
 
-def self_crossing(flat: Floats) -> tuple[int, int] | None:
+def self_crossing(polygon: Floats) -> tuple[int, int] | None:
     """Two sides of a closed 2D polygon that meet other than at their common end."""
-    m = len(flat)
-    ends = np.roll(flat, -1, axis=0)
-    r = ends - flat
+    m = len(polygon)
+    ends = np.roll(polygon, -1, axis=0)
+    r = ends - polygon
     cross = r[:, None, 0] * r[None, :, 1] - r[:, None, 1] * r[None, :, 0]
-    gap = flat[None] - flat[:, None]
+    gap = polygon[None] - polygon[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (gap[..., 0] * r[None, :, 1] - gap[..., 1] * r[None, :, 0]) / cross
         u = (gap[..., 0] * r[:, None, 1] - gap[..., 1] * r[:, None, 0]) / cross
@@ -95,14 +97,14 @@ def self_crossing(flat: Floats) -> tuple[int, int] | None:
     # Of sides on one line t and u are quotients of round-off, however far apart they are.
     length = np.linalg.norm(r, axis=1)
     reach = 1e-12 * float(length.max())
-    hit &= boxes_meet(flat[:, None], ends[:, None], flat[None], ends[None], reach)
+    hit &= boxes_meet(polygon[:, None], ends[:, None], polygon[None], ends[None], reach)
     i, j = np.indices(hit.shape)
     places_between = (i - j) % m
     hit &= (places_between > 1) & (places_between < m - 1)
     # Sides on one line: neighbours that turn back, others that overlap.
-    off = np.abs(gap[..., 0] * r[:, None, 1] - gap[..., 1] * r[:, None, 0]) / length[:, None]
-    along = np.einsum("ijk,ik->ij", gap, r) / length[:, None] ** 2
-    on = (off <= 1e-12 * length.max()) & (along >= -1e-12) & (along <= 1 + 1e-12)
+    offset = np.abs(gap[..., 0] * r[:, None, 1] - gap[..., 1] * r[:, None, 0]) / length[:, None]
+    fraction = np.einsum("ijk,ik->ij", gap, r) / length[:, None] ** 2
+    on = (offset <= 1e-12 * length.max()) & (fraction >= -1e-12) & (fraction <= 1 + 1e-12)
     hit |= on & (places_between != 0) & (((j - i) % m) != 1)
     if not hit.any():
         return None

@@ -41,7 +41,7 @@ class RawMesh:
     middles: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
-def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
+def mesh_from_raw(raw_mesh: RawMesh, source: str) -> Mesh:
     """Make a `Mesh` of what a file says, or say what in the file prevents it.
 
     The highest cells are the body, elements of one dimension less become facet sets. Doubled
@@ -50,7 +50,7 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
 
     Parameters
     ----------
-    raw : RawMesh
+    raw_mesh : RawMesh
         Contents of the file.
     source : str
         Name of the file, for messages.
@@ -65,12 +65,12 @@ def mesh_from_raw(raw: RawMesh, source: str) -> Mesh:
     MeshError
         No cells, cells that are not linear simplices, a surface in 3D.
     """
-    points, cells, facet_sets, cell_sets, number = mesh_parts(raw, source)
-    return with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw, number)
+    points, cells, facet_sets, cell_sets, number = mesh_parts(raw_mesh, source)
+    return with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw_mesh, number)
 
 
 def mesh_parts(
-    raw: RawMesh, source: str
+    raw_mesh: RawMesh, source: str
 ) -> tuple[Floats, Ints, dict[str, Ints], dict[str, Ints], Ints]:
     """What a mesh is made of, as of `mesh_from_raw`.
 
@@ -81,72 +81,80 @@ def mesh_parts(
     number : (n,) array of int
         Number of each point of the file among these points; -1 where no cell uses it.
     """
-    _check_kinds(raw.blocks, source)
-    dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw.blocks) else 2
-    doubled = _stack((data for kind, data in raw.blocks if kind == KINDS[dim]), dim + 1)
-    if not len(doubled):
-        content = ", ".join(f"{len(data)} {kind}" for kind, data in raw.blocks) or "nothing"
+    _check_kinds(raw_mesh.blocks, source)
+    dim = 3 if any(kind == "tetra" and len(data) for kind, data in raw_mesh.blocks) else 2
+    stacked_cells = _stack((data for kind, data in raw_mesh.blocks if kind == KINDS[dim]), dim + 1)
+    if not len(stacked_cells):
+        content = ", ".join(f"{len(data)} {kind}" for kind, data in raw_mesh.blocks) or "nothing"
         raise MeshError(
             f"{source} has no triangles and no tetrahedra (it has {content}): mesh the surface or "
             "volume and export its elements; in gmsh, where there are physical groups, in one."
         )
-    if doubled.min() < 0 or doubled.max() >= len(raw.points):
+    if stacked_cells.min() < 0 or stacked_cells.max() >= len(raw_mesh.points):
         raise MeshError(
-            f"{source}: a cell names a point that the file lacks (it has {len(raw.points)} "
+            f"{source}: a cell names a point that the file lacks (it has {len(raw_mesh.points)} "
             "points): the file is damaged."
         )
-    points = _in_dimensions(raw.points, doubled, dim, source)
-    cells = _unique_rows(doubled)
-    used = np.unique(cells)
-    new = np.full(len(points), -1, dtype=np.int64)
-    new[used] = np.arange(len(used))
-    points, cells = points[used], new[cells]
+    points = _in_dimensions(raw_mesh.points, stacked_cells, dim, source)
+    cells = _unique_rows(stacked_cells)
+    point_numbers = np.unique(cells)
+    new_number = np.full(len(points), -1, dtype=np.int64)
+    new_number[point_numbers] = np.arange(len(point_numbers))
+    points, cells = points[point_numbers], new_number[cells]
     try:
-        bare = sound_mesh(points, cells)
+        bare_mesh = sound_mesh(points, cells)
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from error
-    facet_sets = _facet_sets(raw, bare, new, source)
+    facet_sets = _facet_sets(raw_mesh, bare_mesh, new_number, source)
     cell_sets = {
-        name: np.sort(_row_numbers(cells, new[members]))
-        for name, members in _grouped_rows(raw.sets, KINDS[dim], dim + 1).items()
+        name: np.sort(_row_numbers(cells, new_number[members]))
+        for name, members in _grouped_rows(raw_mesh.sets, KINDS[dim], dim + 1).items()
     }
-    for name, members in raw.point_sets:
+    for name, members in raw_mesh.point_sets:
         if name not in facet_sets:
-            inside = np.zeros(len(points), dtype=bool)
-            inside[new[members][new[members] >= 0]] = True
-            facets = bare.boundary
-            facets = facets[inside[facets].all(axis=1)]
+            is_inside = np.zeros(len(points), dtype=bool)
+            is_inside[new_number[members][new_number[members] >= 0]] = True
+            facets = bare_mesh.boundary
+            facets = facets[is_inside[facets].all(axis=1)]
             if len(facets):
                 facet_sets[name] = facets
-    return points, cells, _without_own_boundary(facet_sets, bare, source), cell_sets, new
+    return (
+        points,
+        cells,
+        _without_own_boundary(facet_sets, bare_mesh, source),
+        cell_sets,
+        new_number,
+    )
 
 
-def with_curved_edges(mesh: Mesh, raw: RawMesh, number: Ints) -> Mesh:
+def with_curved_edges(mesh: Mesh, raw_mesh: RawMesh, number: Ints) -> Mesh:
     """A mesh of a file with the curves that curved edges in it give.
 
     Parameters
     ----------
     mesh : Mesh
         Of the parts that `mesh_parts` returns.
-    raw : RawMesh
+    raw_mesh : RawMesh
     number : (n,) array of int
         As `mesh_parts` returns it.
     """
-    pairs = number[raw.pairs]
+    pairs = number[raw_mesh.pairs]
     is_used = (pairs >= 0).all(axis=1)
     if not is_used.any():
         return mesh
-    middles = np.asarray(raw.middles, dtype=float)[is_used, : mesh.dim]
+    middles = np.asarray(raw_mesh.middles, dtype=float)[is_used, : mesh.dim]
     nodes = raised_lattice(mesh, mesh.boundary, pairs[is_used], middles)
     return with_curves(mesh, mesh.boundary, nodes)
 
 
-def _without_own_boundary(facet_sets: dict[str, Ints], bare: Mesh, source: str) -> dict[str, Ints]:
+def _without_own_boundary(
+    facet_sets: dict[str, Ints], bare_mesh: Mesh, source: str
+) -> dict[str, Ints]:
     """Facet sets with another name for a set "boundary" that is not the boundary of the mesh."""
     if "boundary" not in facet_sets:
         return facet_sets
     facets = facet_sets["boundary"]
-    number, outer = (np.unique(bare.facet_numbers(f)) for f in (facets, bare.boundary))
+    number, outer = (np.unique(bare_mesh.facet_numbers(f)) for f in (facets, bare_mesh.boundary))
     if not np.array_equal(number, outer):
         del facet_sets["boundary"]
         name = "boundary_of_file"
@@ -167,12 +175,16 @@ def sets_to_write(mesh: Mesh) -> tuple[dict[str, Ints], dict[str, Ints]]:
     return facet_sets, dict(mesh.cell_sets)
 
 
-def _facet_sets(raw: RawMesh, bare: Mesh, new: Ints, source: str) -> dict[str, Ints]:
+def _facet_sets(
+    raw_mesh: RawMesh, bare_mesh: Mesh, new_number: Ints, source: str
+) -> dict[str, Ints]:
     facet_sets = {}
-    for name, members in _grouped_rows(raw.sets, KINDS[bare.dim - 1], bare.dim).items():
-        exists = (members >= 0) & (members < len(new))
-        facets = np.where(exists, new[np.where(exists, members, 0)], -1)
-        is_facet = (facets >= 0).all(axis=1) & (bare.facet_numbers(facets) >= 0)
+    for name, members in _grouped_rows(
+        raw_mesh.sets, KINDS[bare_mesh.dim - 1], bare_mesh.dim
+    ).items():
+        is_valid = (members >= 0) & (members < len(new_number))
+        facets = np.where(is_valid, new_number[np.where(is_valid, members, 0)], -1)
+        is_facet = (facets >= 0).all(axis=1) & (bare_mesh.facet_numbers(facets) >= 0)
         if not is_facet.all():
             warn(
                 f"{source}: {int((~is_facet).sum())} of the {len(facets)} elements in set "

@@ -87,24 +87,24 @@ def moved_simplices(simplex_set: Simplices, points: Floats) -> Simplices:
     return replace(simplex_set, points=points, edge_middles=middle, rank=rank, longest_edge=longest)
 
 
-def bisect_simplices(simplex_set: Simplices, marked: Bools) -> tuple[Simplices, Bools]:
+def bisect_simplices(simplex_set: Simplices, is_marked: Bools) -> tuple[Simplices, Bools]:
     """Split the longest edge of each marked cell, and what it takes to conform.
 
     Parameters
     ----------
     simplex_set : Simplices
-    marked : (m,) array of bool
+    is_marked : (m,) array of bool
 
     Returns
     -------
     simplex_set : Simplices
         Untouched cells first, in their order; the old points have their numbers.
-    untouched : (m,) array of bool
+    is_untouched : (m,) array of bool
         Which of the cells are still there.
     """
-    untouched = np.ones(len(simplex_set.cells), dtype=bool)
+    is_untouched = np.ones(len(simplex_set.cells), dtype=bool)
     split = np.zeros(len(simplex_set.edges), dtype=bool)
-    split[_row(simplex_set.cell_to_edge, simplex_set.longest_edge)[marked]] = True
+    split[_row(simplex_set.cell_to_edge, simplex_set.longest_edge)[is_marked]] = True
     # Of each split edge its middle, and the first of its two halves.
     point, half = np.full((2, len(split)), -1, dtype=np.int64)
     middle_edges, number = np.zeros(
@@ -112,39 +112,42 @@ def bisect_simplices(simplex_set: Simplices, marked: Bools) -> tuple[Simplices, 
     )  # edges between a middle and another point
     while True:
         top = _row(simplex_set.cell_to_edge, simplex_set.longest_edge)
-        hanging = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
-        while (ahead := hanging & ~split[top]).any():
-            split[top[ahead]] = True
-            hanging = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
-        if not hanging.any():
-            return simplex_set, untouched
-        still = np.nonzero(untouched)[0]
-        untouched[still[hanging[: len(still)]]] = False
-        new = np.unique(top[hanging])
-        new = new[point[new] < 0]
-        point[new] = len(simplex_set.points) + np.arange(len(new))
-        half[new] = len(simplex_set.edges) + 2 * np.arange(len(new))
-        ends, middle = simplex_set.edges[new], point[new]
+        has_hanging_node = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
+        while (is_ahead := has_hanging_node & ~split[top]).any():
+            split[top[is_ahead]] = True
+            has_hanging_node = np.asarray(split[simplex_set.cell_to_edge].any(axis=1))
+        if not has_hanging_node.any():
+            return simplex_set, is_untouched
+        untouched_cells = np.nonzero(is_untouched)[0]
+        is_untouched[untouched_cells[has_hanging_node[: len(untouched_cells)]]] = False
+        new_edges = np.unique(top[has_hanging_node])
+        new_edges = new_edges[point[new_edges] < 0]
+        point[new_edges] = len(simplex_set.points) + np.arange(len(new_edges))
+        half[new_edges] = len(simplex_set.edges) + 2 * np.arange(len(new_edges))
+        ends, middle = simplex_set.edges[new_edges], point[new_edges]
         halves = np.stack([ends[:, 0], middle, ends[:, 1], middle], axis=1).reshape(-1, 2)
         simplex_set = replace(
-            simplex_set, points=np.concatenate([simplex_set.points, simplex_set.edge_middles[new]])
+            simplex_set,
+            points=np.concatenate([simplex_set.points, simplex_set.edge_middles[new_edges]]),
         )
         simplex_set = _with_edges(simplex_set, halves)
-        across = _edges_across(simplex_set, hanging, point)
-        key = across[..., 0] * _BASE + across[..., 1]
-        fresh = np.setdiff1d(key, middle_edges)
+        edges_across = _edges_across(simplex_set, has_hanging_node, point)
+        key = edges_across[..., 0] * _BASE + edges_across[..., 1]
+        new_keys = np.setdiff1d(key, middle_edges)
         first = len(simplex_set.edges)
-        simplex_set = _with_edges(simplex_set, np.stack([fresh // _BASE, fresh % _BASE], axis=1))
-        middle_edges = np.concatenate([middle_edges, fresh])
-        number = np.concatenate([number, first + np.arange(len(fresh))])
+        simplex_set = _with_edges(
+            simplex_set, np.stack([new_keys // _BASE, new_keys % _BASE], axis=1)
+        )
+        middle_edges = np.concatenate([middle_edges, new_keys])
+        number = np.concatenate([number, first + np.arange(len(new_keys))])
         order = np.argsort(middle_edges)
         middle_edges, number = middle_edges[order], number[order]
         simplex_set = _halved_cells(
-            simplex_set, hanging, point, half, number[np.searchsorted(middle_edges, key)]
+            simplex_set, has_hanging_node, point, half, number[np.searchsorted(middle_edges, key)]
         )
-        more = len(simplex_set.edges) - len(split)
-        split = np.concatenate([split, np.zeros(more, dtype=bool)])
-        point, half = (np.concatenate([a, np.full(more, -1)]) for a in (point, half))
+        edges_added = len(simplex_set.edges) - len(split)
+        split = np.concatenate([split, np.zeros(edges_added, dtype=bool)])
+        point, half = (np.concatenate([a, np.full(edges_added, -1)]) for a in (point, half))
 
 
 def _row(table: Ints, column: Ints) -> Ints:
@@ -159,8 +162,8 @@ def _ranked_edges(points: Floats, edges: Ints) -> tuple[Floats, Ints]:
     step = np.round(np.log2(np.linalg.norm(one - other, axis=1)) * _ALIKE)
     length = np.exp2(step / _ALIKE)[:, None]
     direction = np.round((one - other) / length * _PLACE)
-    leading = direction[np.arange(len(edges)), np.argmax(direction != 0, axis=1)]
-    direction *= np.sign(leading)[:, None]
+    leading_component = direction[np.arange(len(edges)), np.argmax(direction != 0, axis=1)]
+    direction *= np.sign(leading_component)[:, None]
     place = np.round(middle / length * _PLACE)
     return middle, np.concatenate([-step[:, None], direction, place], axis=1).astype(np.int64)
 
@@ -199,7 +202,7 @@ def _edges_across(simplex_set: Simplices, rows: Bools, point: Ints) -> Ints:
 
 
 def _halved_cells(
-    simplex_set: Simplices, rows: Bools, point: Ints, half: Ints, across: Ints
+    simplex_set: Simplices, rows: Bools, point: Ints, half: Ints, edges_across: Ints
 ) -> Simplices:
     """Cells split at the middle of their longest edge; the other ones come first."""
     dim = simplex_set.cells.shape[1] - 1
@@ -217,15 +220,15 @@ def _halved_cells(
     top = edges[n, longest]
     children = []
     for side in (0, 1):
-        stays, goes = pairs[longest, side], pairs[longest, 1 - side]
-        corners, sides, outside = cells.copy(), edges.copy(), facet.copy()
-        corners[n, goes] = point[top]
-        sides[n, longest] = half[top] + (simplex_set.edges[top, 0] != cells[n, stays])
-        for k, edge in zip(others[longest].T, across.T, strict=True):
-            sides[n, pair_of[goes, k]] = edge
-        outside[n, stays] = -1
-        children.append((corners, sides, outside))
-    corners, sides, outside = (np.concatenate(parts) for parts in zip(*children, strict=True))
+        corner_retained, corner_moved = pairs[longest, side], pairs[longest, 1 - side]
+        corners, sides, outer_facets = cells.copy(), edges.copy(), facet.copy()
+        corners[n, corner_moved] = point[top]
+        sides[n, longest] = half[top] + (simplex_set.edges[top, 0] != cells[n, corner_retained])
+        for k, edge in zip(others[longest].T, edges_across.T, strict=True):
+            sides[n, pair_of[corner_moved, k]] = edge
+        outer_facets[n, corner_retained] = -1
+        children.append((corners, sides, outer_facets))
+    corners, sides, outer_facets = (np.concatenate(parts) for parts in zip(*children, strict=True))
     is_unsplit = ~rows
     longest = _longest_edges(simplex_set.edge_middles, simplex_set.rank, sides)
     return replace(
@@ -233,7 +236,7 @@ def _halved_cells(
         cells=np.concatenate([simplex_set.cells[is_unsplit], corners]),
         cell_to_edge=np.concatenate([simplex_set.cell_to_edge[is_unsplit], sides]),
         longest_edge=np.concatenate([simplex_set.longest_edge[is_unsplit], longest]),
-        facet=np.concatenate([simplex_set.facet[is_unsplit], outside]),
+        facet=np.concatenate([simplex_set.facet[is_unsplit], outer_facets]),
         parent=np.concatenate(
             [simplex_set.parent[is_unsplit], np.tile(simplex_set.parent[rows], 2)]
         ),
@@ -345,25 +348,27 @@ def points_between(lines: Sequence[Floats]) -> Floats:
     return np.concatenate([np.zeros((0, 3)), *parts])
 
 
-def radii(lines: Sequence[Floats], over: float) -> Floats:
+def radii(lines: Sequence[Floats], length_of_mean: float) -> Floats:
     """Radius of curvature at the points of `points_between`, from the turn over a length."""
     result = [np.zeros(0)]
     for x in lines:
         side = np.diff(x, axis=0)
         length = np.linalg.norm(side, axis=1)
         arc = np.concatenate([[0.0], np.cumsum(length)])
-        middle, along = (arc[1:] + arc[:-1]) / 2, side / np.maximum(length, 1e-300)[:, None]
+        middle, tangents = (arc[1:] + arc[:-1]) / 2, side / np.maximum(length, 1e-300)[:, None]
         if (x[0] == x[-1]).all():
             middle = np.concatenate([middle - arc[-1], middle, middle + arc[-1]])
-            along = np.concatenate([along, along, along])
+            tangents = np.concatenate([tangents, tangents, tangents])
         s = (arc[:-1] + np.linspace(0, 1, 4)[:, None] * length).ravel()
-        before, after = (
-            np.stack([np.interp(s + way, middle, part) for part in along.T], axis=1)
-            for way in (-over / 2, over / 2)
+        previous_tangent, next_tangent = (
+            np.stack([np.interp(s + way, middle, part) for part in tangents.T], axis=1)
+            for way in (-length_of_mean / 2, length_of_mean / 2)
         )
-        cosine = np.einsum("ij,ij->i", before, after)
-        cosine /= np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1) + 1e-300
-        result.append(over / np.maximum(np.arccos(np.clip(cosine, -1, 1)), 1e-12))
+        cosine = np.einsum("ij,ij->i", previous_tangent, next_tangent)
+        cosine /= (
+            np.linalg.norm(previous_tangent, axis=1) * np.linalg.norm(next_tangent, axis=1) + 1e-300
+        )
+        result.append(length_of_mean / np.maximum(np.arccos(np.clip(cosine, -1, 1)), 1e-12))
     return np.concatenate(result)
 
 
@@ -416,18 +421,18 @@ def refine_to(mesh: Mesh, size_at: Floats, sweeps: int) -> Mesh:
     return _to_size(mesh, lambda centre, parent: size_at[parent], sweeps)
 
 
-def _cells_given(mesh: Mesh, given: Ints) -> Mesh:
-    if given.size and (given.min() < 0 or given.max() >= len(mesh.cells)):
+def _cells_given(mesh: Mesh, cells: Ints) -> Mesh:
+    if cells.size and (cells.min() < 0 or cells.max() >= len(mesh.cells)):
         raise MeshError(
-            f"refine: cells names {int(given.min() if given.min() < 0 else given.max())}; the mesh "
+            f"refine: cells names {int(cells.min() if cells.min() < 0 else cells.max())}; the mesh "
             f"has {len(mesh.cells)} cells, numbered from 0."
         )
-    if not given.size:
+    if not cells.size:
         return mesh
-    marked = np.zeros(len(mesh.cells), dtype=bool)
-    marked[given] = True
+    is_marked = np.zeros(len(mesh.cells), dtype=bool)
+    is_marked[cells] = True
     flat_points = np.zeros(0, dtype=np.int64)
-    simplex_set, _, _, flat_points = _sweep(mesh, simplices(mesh), marked, flat_points)
+    simplex_set, _, _, flat_points = _sweep(mesh, simplices(mesh), is_marked, flat_points)
     warn_of_flat_points(simplex_set.points, flat_points)
     return _finished_mesh(mesh, simplex_set)
 
@@ -436,43 +441,45 @@ def _to_size(mesh: Mesh, size_at: Callable[[Floats, Ints], Floats], sweeps: int 
     """Bisect until every cell is as small as wanted of its centre and its parent."""
     simplex_set = simplices(mesh)
     limit = np.asarray(size_at(simplex_set.centre, simplex_set.parent))
-    done, flat_points = 0, np.zeros(0, dtype=np.int64)
-    while sweeps is None or done < sweeps:
-        marked = simplex_set.size > limit
-        if not marked.any():
+    sweeps_done, flat_points = 0, np.zeros(0, dtype=np.int64)
+    while sweeps is None or sweeps_done < sweeps:
+        is_marked = simplex_set.size > limit
+        if not is_marked.any():
             break
-        simplex_set, old, is_unsplit_cell, flat_points = _sweep(
-            mesh, simplex_set, marked, flat_points
+        simplex_set, is_old, is_unsplit_cell, flat_points = _sweep(
+            mesh, simplex_set, is_marked, flat_points
         )
         # A size is asked for once, of cells that are new or whose points have moved.
-        limit = np.concatenate([limit[old], np.zeros(len(simplex_set.cells) - len(limit[old]))])
-        new = ~is_unsplit_cell
-        limit[new] = size_at(simplex_set.centre[new], simplex_set.parent[new])
-        done += 1
+        limit = np.concatenate(
+            [limit[is_old], np.zeros(len(simplex_set.cells) - len(limit[is_old]))]
+        )
+        is_new = ~is_unsplit_cell
+        limit[is_new] = size_at(simplex_set.centre[is_new], simplex_set.parent[is_new])
+        sweeps_done += 1
     warn_of_flat_points(simplex_set.points, flat_points)
-    return _finished_mesh(mesh, simplex_set) if done else mesh
+    return _finished_mesh(mesh, simplex_set) if sweeps_done else mesh
 
 
 def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
     """Wanted size of cells, checked as it is asked for."""
-    what, least = "the size of refine", FINEST * mesh.extent
+    what, lower = "the size of refine", FINEST * mesh.extent
     function = size if callable(size) else None
 
     def size_at(centre: Floats, parent: Ints) -> Floats:
-        given = size if function is None else call_function(function, what, centre.copy())
-        value = numbers(given, what, finite=False, error=MeshError)
+        sizes = size if function is None else call_function(function, what, centre.copy())
+        value = numbers(sizes, what, must_be_finite=False, error=MeshError)
         if value.shape not in ((), (len(centre),)):
             raise MeshError(
                 f"{what} has the shape {value.shape} at {len(centre)} centres: return one number "
                 "for each."
             )
         value = np.broadcast_to(value, len(centre))
-        is_invalid = ~(value >= least)
+        is_invalid = ~(value >= lower)
         if is_invalid.any():
             i = int(np.argmax(is_invalid))
             raise MeshError(
                 f"{what} is {value[i]:g} at {at(centre[i])} ({int(is_invalid.sum())} such cells): "
-                f"it must be a length, no less than a millionth of the body ({least:.3g})."
+                f"it must be a length, no less than a millionth of the body ({lower:.3g})."
             )
         return value
 
@@ -480,7 +487,7 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
 
 
 def _sweep(
-    mesh: Mesh, simplex_set: Simplices, marked: Bools, flat_points: Ints
+    mesh: Mesh, simplex_set: Simplices, is_marked: Bools, flat_points: Ints
 ) -> tuple[Simplices, Bools, Bools, Ints]:
     """One sweep of bisections, its new points on their curves.
 
@@ -488,49 +495,52 @@ def _sweep(
     ----------
     mesh : Mesh
     simplex_set : Simplices
-    marked : (m,) array of bool
+    is_marked : (m,) array of bool
     flat_points : (k,) array of int
         Points that earlier sweeps left off their curves: smaller cells may let them go.
 
     Returns
     -------
     simplex_set : Simplices
-    old : (m,) array of bool
+    is_old : (m,) array of bool
         Which of the cells before are still there; they come first.
     is_unsplit_cell : (m',) array of bool
         Which of the cells now are those, with their points where they were.
     flat_points : (k,) array of int
     """
     first = len(simplex_set.points)
-    fine, old = bisect_simplices(simplex_set, marked)
-    if len(fine.cells) > _MOST_CELLS:
+    fine_set, is_old = bisect_simplices(simplex_set, is_marked)
+    if len(fine_set.cells) > _MOST_CELLS:
         raise MeshError(
             f"refine: the size asks for more than {_MOST_CELLS:.0e} cells "
-            f"({len(fine.cells)} and more to come): enlarge it."
+            f"({len(fine_set.cells)} and more to come): enlarge it."
         )
-    is_unsplit_cell = np.arange(len(fine.cells)) < int(old.sum())
+    is_unsplit_cell = np.arange(len(fine_set.cells)) < int(is_old.sum())
     if mesh.curves:
         sets = {
-            name: _parts(fine, mesh.facet_numbers(mesh.facet_sets[name])) for name in mesh.curves
+            name: _parts(fine_set, mesh.facet_numbers(mesh.facet_sets[name]))
+            for name in mesh.curves
         }
-        outer = _parts(fine, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
-        new = np.arange(len(fine.points)) >= first
-        new[flat_points] = True
+        outer = _parts(fine_set, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
+        is_new = np.arange(len(fine_set.points)) >= first
+        is_new[flat_points] = True
         size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in mesh.curves))
-        points, changed, flat_points = on_curves(
-            fine.points, fine.cells, new, sets, outer, mesh.curves, size
+        points, is_changed, flat_points = on_curves(
+            fine_set.points, fine_set.cells, is_new, sets, outer, mesh.curves, size
         )
-        if changed.any():
-            fine = moved_simplices(fine, points)
-            is_unsplit_cell &= ~changed[fine.cells].any(axis=1)
-    return fine, old, is_unsplit_cell, flat_points
+        if is_changed.any():
+            fine_set = moved_simplices(fine_set, points)
+            is_unsplit_cell &= ~is_changed[fine_set.cells].any(axis=1)
+    return fine_set, is_old, is_unsplit_cell, flat_points
 
 
 def _parts(simplex_set: Simplices, facets: Ints) -> Ints:
     """Facets of the simplices in which facets of the mesh were split `(k, d)`."""
-    lies = np.zeros(max(int(simplex_set.facet.max()), int(facets.max(initial=0))) + 2, dtype=bool)
-    lies[facets] = True  # the last entry is that of no facet
-    cell, corner = np.nonzero(lies[simplex_set.facet])
+    is_in_set = np.zeros(
+        max(int(simplex_set.facet.max()), int(facets.max(initial=0))) + 2, dtype=bool
+    )
+    is_in_set[facets] = True  # the last entry is that of no facet
+    cell, corner = np.nonzero(is_in_set[simplex_set.facet])
     return np.take_along_axis(
         simplex_set.cells[cell], local_facets(simplex_set.points.shape[1])[corner], axis=1
     )
@@ -560,12 +570,14 @@ def _split_all_edges(mesh: Mesh) -> Mesh:
     cells, parent = (_triangles, _tetrahedra)[mesh.dim - 2](points, nodes)
     inverse = np.argsort(parent, kind="stable").reshape(len(mesh.cells), -1)
     facets = {name: _facet_parts(mesh, facets) for name, facets in mesh.facet_sets.items()}
-    curved = {name: facets[name] for name in mesh.curves}
-    if curved:
+    curved_facets = {name: facets[name] for name in mesh.curves}
+    if curved_facets:
         outer = facets["boundary"]
-        new = np.arange(len(points)) >= mesh.n_points
-        size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in curved))
-        points, _, flat_points = on_curves(points, cells, new, curved, outer, mesh.curves, size)
+        is_new = np.arange(len(points)) >= mesh.n_points
+        size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in curved_facets))
+        points, _, flat_points = on_curves(
+            points, cells, is_new, curved_facets, outer, mesh.curves, size
+        )
         warn_of_flat_points(points, flat_points)
     members = {name: inverse[members].ravel() for name, members in mesh.cell_sets.items()}
     return sound_mesh(points, cells, facets, members, mesh.curves)

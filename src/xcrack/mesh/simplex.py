@@ -148,9 +148,9 @@ def _symmetric_points(dim: int, degree: int) -> tuple[Floats, Floats]:
     for w, *first in _RULES[dim][degree]:
         orbit = np.array(list(permutations((*first, 1 - sum(first)))))
         # Images less than 1e-6 apart are one; the rules keep their points far wider apart.
-        unique = np.unique(np.round(orbit, 6), axis=0, return_index=True)[1]
-        bary.append(orbit[np.sort(unique)])
-        weight.append(np.full(len(unique), w))
+        first_rows = np.unique(np.round(orbit, 6), axis=0, return_index=True)[1]
+        bary.append(orbit[np.sort(first_rows)])
+        weight.append(np.full(len(first_rows), w))
     points, total = np.concatenate(bary), np.concatenate(weight)
     return lock(points / points.sum(axis=1, keepdims=True)), lock(total / total.sum())
 

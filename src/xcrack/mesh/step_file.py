@@ -220,9 +220,9 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
     if not len(cells):
         raise MeshError(f"gmsh made no cells of {source}: take a smaller size.")
     faces = {tag: elements(dim - 1, tag) for _, tag in gmsh.model.getEntities(dim - 1)}
-    used = np.unique(cells)
-    new = np.full(len(points), -1, dtype=np.int64)
-    new[used] = np.arange(len(used))
+    point_numbers = np.unique(cells)
+    new_number = np.full(len(points), -1, dtype=np.int64)
+    new_number[point_numbers] = np.arange(len(point_numbers))
     facet_sets = {}
     for name, selector in sets.items():
         members = [tag for tag in faces if len(faces[tag])]
@@ -234,10 +234,10 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
             ]
         else:
             facet_numbers = whole_numbers(selector, f"sets[{name!r}]", (None,), error=GeometryError)
-            unknown = sorted(set(facet_numbers.tolist()) - set(members))
-            if unknown:
+            strangers = sorted(set(facet_numbers.tolist()) - set(members))
+            if strangers:
                 raise GeometryError(
-                    f"sets[{name!r}]: {source} has no faces {unknown}: give some of {members}."
+                    f"sets[{name!r}]: {source} has no faces {strangers}: give some of {members}."
                 )
             members = facet_numbers.tolist()
         if not members:
@@ -246,19 +246,19 @@ def _mesh(gmsh: ModuleType, dim: int, source: str, sets: Mapping[str, Selector])
                 f"sets[{name!r}] selects none of the {len(faces)} faces of {source}, whose points "
                 f"have their middles at {centres[:12]}: choose all points of a face."
             )
-        facet_sets[name] = new[np.concatenate([faces[tag] for tag in members])]
-    mesh = sound_mesh(points[used][:, :dim], new[cells], facet_sets)
-    curved = {
-        tag: new[face]
+        facet_sets[name] = new_number[np.concatenate([faces[tag] for tag in members])]
+    mesh = sound_mesh(points[point_numbers][:, :dim], new_number[cells], facet_sets)
+    curved_facets = {
+        tag: new_number[face]
         for tag, face in faces.items()
         if len(face) and gmsh.model.getType(dim - 1, tag) not in _STRAIGHT
     }
     lines = {
-        tag: new[elements(1, tag)]
+        tag: new_number[elements(1, tag)]
         for _, tag in gmsh.model.getEntities(1)
         if dim == 3 and gmsh.model.getType(1, tag) not in _STRAIGHT
     }
-    return _with_shapes(gmsh, mesh, curved, lines)
+    return _with_shapes(gmsh, mesh, curved_facets, lines)
 
 
 def _with_shapes(
@@ -285,24 +285,24 @@ def _with_shapes(
         return mesh
     facets = np.concatenate(list(outer.values()))
     tag = np.repeat(list(outer), [len(face) for face in outer.values()])
-    flat = lattice(mesh.points, facets)
+    grid = lattice(mesh.points, facets)
     # Nodes of edges of the shape belong to these, all others to the face on which they lie.
-    owner, of_line = np.zeros((2, len(flat.points)), dtype=np.int64)
-    for place in flat.facets[:, mesh.dim :].T:
+    owner, of_line = np.zeros((2, len(grid.points)), dtype=np.int64)
+    for place in grid.facets[:, mesh.dim :].T:
         owner[place] = tag
     for number, pairs in lines.items():
-        _, known = rows_of(np.sort(pairs, axis=1), flat.corner[flat.edges], mesh.n_points)
-        nodes = len(flat.corner) + 3 * np.nonzero(known)[0][:, None] + np.arange(3)
+        _, has_row = rows_of(np.sort(pairs, axis=1), grid.corner[grid.edges], mesh.n_points)
+        nodes = len(grid.corner) + 3 * np.nonzero(has_row)[0][:, None] + np.arange(3)
         of_line[nodes.ravel()] = number
-    points = flat.points.copy()
+    points = grid.points.copy()
     for dim, numbers in ((mesh.dim - 1, np.where(of_line > 0, 0, owner)), (1, of_line)):
         for number in np.unique(numbers[numbers > 0]).tolist():
             rows = np.nonzero(numbers == number)[0]
             x = np.zeros((len(rows), 3))
-            x[:, : mesh.dim] = flat.points[rows]
+            x[:, : mesh.dim] = grid.points[rows]
             nearest = gmsh.model.getClosestPoint(dim, number, x.ravel())[0]
             points[rows] = np.reshape(nearest, (-1, 3))[:, : mesh.dim]
-    return with_curves(mesh, facets, replace(flat, points=points))
+    return with_curves(mesh, facets, replace(grid, points=points))
 
 
 def _is_box(selector: Any) -> bool:
@@ -326,15 +326,15 @@ def _selected_facets(
     x = points[np.unique(face)]
     result = call_function(selector, f"sets[{name!r}]", x)
     try:
-        inside = np.asarray(result)
+        is_inside = np.asarray(result)
     except Exception as error:  # ragged rows, or what an object's own __array__ raises
         raise GeometryError(
             f"sets[{name!r}] returned {value_text(result)}: return one bool for each point."
         ) from error
-    if inside.shape != (len(x),) or inside.dtype != bool:
+    if is_inside.shape != (len(x),) or is_inside.dtype != bool:
         raise GeometryError(
-            f"sets[{name!r}] returned shape {inside.shape} of {inside.dtype} for {len(x)} points: "
-            "return one bool for each."
+            f"sets[{name!r}] returned shape {is_inside.shape} of {is_inside.dtype} for {len(x)} "
+            "points: return one bool for each."
         )
-    chosen: Bools = inside
+    chosen: Bools = is_inside
     return bool(chosen.all())

@@ -47,8 +47,8 @@ def on_rim(faces: Ints) -> Bools:
 
 def rim(faces: Ints) -> tuple[Ints, Ints]:
     """Boundary sides in the direction of their faces `(k, 2)`, and these faces `(k,)`."""
-    alone = on_rim(faces)
-    return sides(faces)[alone], np.nonzero(alone)[0]
+    is_rim = on_rim(faces)
+    return sides(faces)[is_rim], np.nonzero(is_rim)[0]
 
 
 def loops(faces: Ints) -> list[Ints]:
@@ -57,18 +57,18 @@ def loops(faces: Ints) -> list[Ints]:
     This is the direction of b = t x n where t points out of the surface. A loop starts at its
     lowest point number. Loops that touch in a point are loops of their own.
     """
-    faces, original = _parted_at_points(faces)
+    faces, original_numbers = _parted_at_points(faces)
     edges, _ = rim(faces)
     follower = {int(b): int(a) for a, b in edges}
     result = []
     while follower:
         start = min(follower)
         loop = [start]
-        current = follower.pop(start)
-        while current != start:
-            loop.append(current)
-            current = follower.pop(current)
-        number = original[np.array(loop, dtype=np.int64)]
+        vertex = follower.pop(start)
+        while vertex != start:
+            loop.append(vertex)
+            vertex = follower.pop(vertex)
+        number = original_numbers[np.array(loop, dtype=np.int64)]
         result.append(np.roll(number, -int(np.argmin(number))))
     return result
 
@@ -77,23 +77,23 @@ def _parted_at_points(faces: Ints) -> tuple[Ints, Ints]:
     """Faces that share no more than a point parted there, and the numbers of points before."""
     edges, _ = rim(faces)
     count = int(faces.max()) + 1 if len(faces) else 0
-    original = list(range(count))
-    pinched = np.nonzero(np.bincount(edges[:, 0], minlength=count) > 1)[0]
-    if not len(pinched):
+    original_numbers = list(range(count))
+    pinched_points = np.nonzero(np.bincount(edges[:, 0], minlength=count) > 1)[0]
+    if not len(pinched_points):
         return faces, np.arange(count)
-    parted = np.array(faces)
-    for point in pinched.tolist():
-        around, corner = np.nonzero(faces == point)
-        neighbours = np.stack([faces[around, (corner + k) % 3] for k in (1, 2)], axis=1)
+    parted_faces = np.array(faces)
+    for point in pinched_points.tolist():
+        faces_around, corner = np.nonzero(faces == point)
+        neighbours = np.stack([faces[faces_around, (corner + k) % 3] for k in (1, 2)], axis=1)
         part = np.unique(neighbours, return_inverse=True)[1].reshape(-1, 2)
-        for _ in range(len(around)):
-            np.minimum.at(lowest := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
-            part = lowest[part]
+        for _ in range(len(faces_around)):
+            np.minimum.at(smallest := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
+            part = smallest[part]
         for other in np.unique(part[:, 0])[1:]:
             is_of_part = part[:, 0] == other
-            parted[around[is_of_part], corner[is_of_part]] = len(original)
-            original.append(point)
-    return parted, np.array(original, dtype=np.int64)
+            parted_faces[faces_around[is_of_part], corner[is_of_part]] = len(original_numbers)
+            original_numbers.append(point)
+    return parted_faces, np.array(original_numbers, dtype=np.int64)
 
 
 def ruled_strip(
@@ -102,8 +102,8 @@ def ruled_strip(
     origin: Floats,
     offset: Floats,
     layers: int,
-    closed: bool,
-    crossed: bool = False,
+    is_closed: bool,
+    is_crossed: bool = False,
 ) -> tuple[Floats, Ints]:
     """Strip of triangles on one side of a polyline, spanned by a ray from each of its points.
 
@@ -117,9 +117,9 @@ def ruled_strip(
         Points of the polyline and the rays; a ray of zero length adds no points.
     layers : int
         Rows of triangles.
-    closed : bool
+    is_closed : bool
         Whether the last ray is joined with the first.
-    crossed : bool
+    is_crossed : bool
         Whether quadrilaterals are divided by both diagonals: one alone would make a twisted strip
         depend on its direction.
 
@@ -131,19 +131,19 @@ def ruled_strip(
         Oriented like a surface whose front the polyline is.
     """
     grid = np.repeat(base[:, None], layers + 1, axis=1)
-    long = np.nonzero(np.abs(offset).max(axis=1) > 0)[0]
+    long_lines = np.nonzero(np.abs(offset).max(axis=1) > 0)[0]
     share = np.arange(1, layers + 1) / layers
-    grid[long, 1:] = n_points + np.arange(len(long) * layers).reshape(-1, layers)
-    points = origin[long, None] + share[:, None] * offset[long, None]
-    first = grid if closed else grid[:-1]
-    second = np.roll(grid, -1, axis=0) if closed else grid[1:]
+    grid[long_lines, 1:] = n_points + np.arange(len(long_lines) * layers).reshape(-1, layers)
+    points = origin[long_lines, None] + share[:, None] * offset[long_lines, None]
+    first = grid if is_closed else grid[:-1]
+    second = np.roll(grid, -1, axis=0) if is_closed else grid[1:]
     corners = [first[:, :-1], second[:, :-1], second[:, 1:], first[:, 1:]]
     a, b, c, d = (each.ravel() for each in corners)
     points, middles = points.reshape(-1, 3), np.zeros((0, 3), dtype=np.int64)
-    if crossed:
-        four = (a != b) & (c != d)
-        quads = np.stack([a, b, c, d], axis=1)[four]
-        a, b, c, d = (each[~four] for each in (a, b, c, d))
+    if is_crossed:
+        is_quad = (a != b) & (c != d)
+        quads = np.stack([a, b, c, d], axis=1)[is_quad]
+        a, b, c, d = (each[~is_quad] for each in (a, b, c, d))
         x = np.zeros((n_points + len(points), 3))
         x[base], x[n_points:] = origin, points
         middle = n_points + len(points) + np.arange(len(quads))
@@ -154,11 +154,11 @@ def ruled_strip(
         points = np.concatenate([points, x[quads].mean(axis=1)])
     faces = np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=1)
     faces = np.concatenate([faces.reshape(-1, 3), middles])
-    real = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    return points, faces[real]
+    is_proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return points, faces[is_proper]
 
 
-def split_sides(points: Floats, faces: Ints, marked: Bools) -> tuple[Floats, Ints]:
+def split_sides(points: Floats, faces: Ints, is_marked: Bools) -> tuple[Floats, Ints]:
     """Halve the marked sides `(f, 3)` and what must go with them, without hanging points.
 
     A face is cut through its longest side first (Rivara, 1984), so that angles stay bounded.
@@ -171,12 +171,12 @@ def split_sides(points: Floats, faces: Ints, marked: Bools) -> tuple[Floats, Int
     longest = np.argmax(length[inverse] * (1 - 1e-12 * np.arange(3)), axis=1)
     longest_side = inverse[np.arange(len(faces)), longest]
     cut = np.zeros(len(key), dtype=bool)
-    cut[inverse[marked]] = True
+    cut[inverse[is_marked]] = True
     while True:
-        pulled = cut[inverse].any(axis=1) & ~cut[longest_side]
-        if not pulled.any():
+        is_pulled = cut[inverse].any(axis=1) & ~cut[longest_side]
+        if not is_pulled.any():
             break
-        cut[longest_side[pulled]] = True
+        cut[longest_side[is_pulled]] = True
     number = np.full(len(key), -1)
     number[cut] = len(points) + np.arange(int(cut.sum()))
     middle = (points[pairs[cut, 0]] + points[pairs[cut, 1]]) / 2
@@ -204,10 +204,10 @@ def components(faces: Ints) -> Ints:
     from scipy.sparse.csgraph import connected_components
 
     _, inverse = np.unique(side_keys(faces), return_inverse=True)
-    flat = inverse.ravel()
+    edges = inverse.ravel()
     face = np.repeat(np.arange(len(faces)), 3)
-    order = np.argsort(flat, kind="stable")
-    same_edge = flat[order][1:] == flat[order][:-1]
+    order = np.argsort(edges, kind="stable")
+    same_edge = edges[order][1:] == edges[order][:-1]
     one, other = face[order][:-1][same_edge], face[order][1:][same_edge]
     graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(faces),) * 2)
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
@@ -216,30 +216,30 @@ def components(faces: Ints) -> Ints:
 def oriented_faces(faces: Ints) -> Ints | None:
     """Faces turned so that neighbours agree, the first of each piece as it is; None: one-sided."""
     _, inverse = np.unique(side_keys(faces), return_inverse=True)
-    flat = inverse.ravel()
+    edges = inverse.ravel()
     pairs = sides(faces).reshape(-1, 2)
-    forward = pairs[:, 0] < pairs[:, 1]
-    order = np.argsort(flat, kind="stable")
-    same_edge = flat[order][1:] == flat[order][:-1]
+    is_forward = pairs[:, 0] < pairs[:, 1]
+    order = np.argsort(edges, kind="stable")
+    same_edge = edges[order][1:] == edges[order][:-1]
     one, other = order[:-1][same_edge], order[1:][same_edge]
-    differ = forward[one] == forward[other]
+    differ = is_forward[one] == is_forward[other]
     neighbours: list[list[tuple[int, bool]]] = [[] for _ in faces]
     for i, j, turn in zip(one // 3, other // 3, differ, strict=True):
         neighbours[i].append((int(j), bool(turn)))
         neighbours[j].append((int(i), bool(turn)))
-    turned = np.full(len(faces), -1)
+    sense = np.full(len(faces), -1)
     for start in range(len(faces)):
-        if turned[start] >= 0:
+        if sense[start] >= 0:
             continue
-        turned[start] = 0
+        sense[start] = 0
         queue = [start]
         while queue:
             i = queue.pop()
             for j, turn in neighbours[i]:
-                target_turn = int(turned[i]) ^ int(turn)
-                if turned[j] < 0:
-                    turned[j] = target_turn
+                target_turn = int(sense[i]) ^ int(turn)
+                if sense[j] < 0:
+                    sense[j] = target_turn
                     queue.append(j)
-                elif turned[j] != target_turn:
+                elif sense[j] != target_turn:
                     return None
-    return np.where(turned[:, None] == 1, faces[:, ::-1], faces)
+    return np.where(sense[:, None] == 1, faces[:, ::-1], faces)

@@ -182,14 +182,14 @@ class Deck:
         ProblemError, GeometryError
             The deck has no material and none is given; as of `Problem`.
         """
-        given: dict[str, Any] = {"supports": self.supports, "loads": self.loads, **choices}
-        if "material" not in given:
+        arguments: dict[str, Any] = {"supports": self.supports, "loads": self.loads, **choices}
+        if "material" not in arguments:
             if self.material is None:
                 raise ProblemError(
                     f"{self.path.name} has no material: give problem(material=Isotropic(...))."
                 )
-            given["material"] = self.material
-        return Problem(self.mesh, cracks=cracks, **given)
+            arguments["material"] = self.material
+        return Problem(self.mesh, cracks=cracks, **arguments)
 
     def __str__(self) -> str:
         names = ", ".join(each.name for each in self.supports) or "none"
@@ -278,7 +278,7 @@ def read_deck(
     body = DeckBody(model, [one for n, one in enumerate(loads) if f"load {n}" not in parts], parts)
     scene = _Scene(body, state)
     material = body.material(state.temperature, state.initial_temperature)
-    supports, given = scene.supports(), scene.loads()
+    supports, deck_loads = scene.supports(), scene.loads()
     uses = _uses(state, left_out)
     _tell_missed(path, uses)
     return Deck(
@@ -286,7 +286,7 @@ def read_deck(
         mesh=body.finished_mesh(scene.more_facets),
         material=material,
         supports=tuple(supports),
-        loads=tuple(given),
+        loads=tuple(deck_loads),
         step="" if chosen is None else chosen.name,
         steps=tuple(each.name for each in steps),
         amplitudes=MappingProxyType({
@@ -306,20 +306,20 @@ def read_deck(
 
 def _mesh_deck(path: Path) -> Deck:
     """A deck of which mesh and sets alone are taken."""
-    raw, uses = raw_mesh_of(path)
-    raw = linear_mesh(raw, path.name, strict=False)
-    points, cells, facet_sets, cell_sets, number = mesh_parts(raw, path.name)
-    mesh = with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw, number)
+    raw_mesh, uses = raw_mesh_of(path)
+    raw_mesh = linear_mesh(raw_mesh, path.name, strict=False)
+    points, cells, facet_sets, cell_sets, number = mesh_parts(raw_mesh, path.name)
+    mesh = with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw_mesh, number)
     mesh = with_stored_curves(mesh, path)
-    _tell_missed(path, uses, sets_without_facets(raw, mesh))
+    _tell_missed(path, uses, sets_without_facets(raw_mesh, mesh))
     return Deck(path, mesh, keywords=tuple(uses))
 
 
-def _tell_missed(path: Path, uses: Iterable[KeywordUse], missed: str = "") -> None:
+def _tell_missed(path: Path, uses: Iterable[KeywordUse], message: str = "") -> None:
     names = missed_words(uses)
     parts = [f"ignored: {', '.join(names)}; print(deck) says why"] if names else []
-    if missed:
-        parts.append(missed)
+    if message:
+        parts.append(message)
     if parts:
         warn(f"{path.name}: {'; '.join(parts)}.")
 
@@ -358,7 +358,7 @@ class _Scene:
         result: list[Support] = []
         for n, one in enumerate(self.state.restraints):
             every = np.unique(np.concatenate(one.rows))
-            alike: dict[tuple[bytes, bytes], tuple[Ints, Floats, list[int]]] = {}
+            equal_supports: dict[tuple[bytes, bytes], tuple[Ints, Floats, list[int]]] = {}
             for axis in one.axes:
                 rows = every[self.state.owner[axis, every] == n]
                 self._check_reference(rows[~self.body.is_inside(rows)], one.place)
@@ -366,8 +366,8 @@ class _Scene:
                 values = self.state.value[axis, rows]
                 if len(rows) and axis < self.body.dim:
                     key = rows.tobytes(), values.tobytes()
-                    alike.setdefault(key, (rows, values, []))[2].append(axis)
-            for rows, values, axes in alike.values():
+                    equal_supports.setdefault(key, (rows, values, []))[2].append(axis)
+            for rows, values, axes in equal_supports.values():
                 result += self._supports_of(rows, values, axes, one.name)
         return result + self._coupled_supports()
 
@@ -392,25 +392,27 @@ class _Scene:
         """Facet set and points that nodes are."""
         body, mesh = self.body, self.body.mesh
         facets = body.facets_within(numbers)
-        remaining = np.zeros(len(body.places), dtype=bool)
-        remaining[numbers] = True
+        is_remaining = np.zeros(len(body.places), dtype=bool)
+        is_remaining[numbers] = True
         # Between two held nodes of linear elements the edge is held.
-        remaining[mesh.n_points :] |= (
-            remaining[mesh.edges].all(axis=1) & body.is_bare[mesh.n_points :]
+        is_remaining[mesh.n_points :] |= (
+            is_remaining[mesh.edges].all(axis=1) & body.is_bare[mesh.n_points :]
         )
         result: list[Any] = []
         if len(facets):
-            remaining[facets] = False
-            remaining[body.edges_of(facets)] = False
-            named = {**mesh.facet_sets, **self.more_facets}
-            first = sorted(named.items(), key=lambda item: item[0].casefold() != name.casefold())
-            known = body.name_of_facets(facets, first)
-            if not known:
-                known = name if name and name not in named else f"support {name or len(named)}"
-                self.more_facets[known] = facets
-            result.append(known)
-        if remaining.any():
-            result.append(body.places[remaining])
+            is_remaining[facets] = False
+            is_remaining[body.edges_of(facets)] = False
+            all_sets = {**mesh.facet_sets, **self.more_facets}
+            first = sorted(all_sets.items(), key=lambda item: item[0].casefold() != name.casefold())
+            set_name = body.name_of_facets(facets, first)
+            if not set_name:
+                set_name = (
+                    name if name and name not in all_sets else f"support {name or len(all_sets)}"
+                )
+                self.more_facets[set_name] = facets
+            result.append(set_name)
+        if is_remaining.any():
+            result.append(body.places[is_remaining])
         return result
 
     def _check_reference(self, rows: Ints, place: str) -> None:
@@ -469,12 +471,12 @@ class _Scene:
     def _forces(self) -> list[Load]:
         body, force = self.body, self.state.force
         rows = np.nonzero(force.any(axis=1))[0]
-        inside = body.is_inside(rows)
-        result = [self._coupled_force(node) for node in rows[~inside].tolist()]
-        rows = rows[inside]
-        turned = rows[force[rows, 3:].any(axis=1)]
-        if len(turned):
-            keyword, line = self.state.force_line[int(turned[0])]
+        is_inside = body.is_inside(rows)
+        result = [self._coupled_force(node) for node in rows[~is_inside].tolist()]
+        rows = rows[is_inside]
+        rows_with_moment = rows[force[rows, 3:].any(axis=1)]
+        if len(rows_with_moment):
+            keyword, line = self.state.force_line[int(rows_with_moment[0])]
             keyword.refuse(
                 "nodes of solid elements take no moments: couple the surface by *COUPLING and "
                 "*DISTRIBUTING.", line, ProblemError
@@ -496,11 +498,11 @@ class _Scene:
                 f"{words}: couple it to a surface by *COUPLING and *DISTRIBUTING.", line,
                 ProblemError,
             )  # fmt: skip
-        given = self.state.force[node] / body.thickness
-        moment: Any = given[3:] if body.dim == 3 else float(given[5])
+        force_and_moment = self.state.force[node] / body.thickness
+        moment: Any = force_and_moment[3:] if body.dim == 3 else float(force_and_moment[5])
         return resultant(
-            self._surface(coupling), given[: body.dim], moment if np.any(moment) else None,
-            about=body.model.points[node, : body.dim],
+            self._surface(coupling), force_and_moment[: body.dim],
+            moment if np.any(moment) else None, about=body.model.points[node, : body.dim],
         )  # fmt: skip
 
     def _spread_load(self, one: SpreadLoad, n: int) -> list[Load]:
@@ -572,11 +574,11 @@ class _Scene:
             return None
         strain = np.full(len(body.model.points), np.nan)
         alpha = 0.0
-        expanding = [key for key in body.sections if len(body.materials[key].expansion)]
-        if expanding and len(body.sections) > 1:  # each material has its own
+        expanding_sections = [key for key in body.sections if len(body.materials[key].expansion)]
+        if expanding_sections and len(body.sections) > 1:  # each material has its own
             change = state.temperature - state.initial_temperature
             return temperature(body.point_field(change, "temperature"))
-        for key in expanding:
+        for key in expanding_sections:
             one = body.materials[key]
             alpha = float(one.expansion[0, 0])
             rows = body.nodes_of_material(key)
@@ -625,10 +627,10 @@ def _uses(state: DeckState, left_out: set[str]) -> list[KeywordUse]:
     """A row for each keyword: what it was used for, or why it is ignored."""
     model = state.model
     uses = model.mesh_uses()
-    known = {**_MATERIAL, **_SCENE, **_COUPLING}
+    known_keywords = {**_MATERIAL, **_SCENE, **_COUPLING}
     for name in dict.fromkeys(line.keyword.name for line in model.lines):
         lines = model.lines_of(name)
-        now = [line for line in lines if state.counts(line)]
+        current_lines = [line for line in lines if state.counts(line)]
         is_frame = name in ("STEP", "END STEP", "STATIC")
         others = [] if is_frame else [line for line in lines if not state.counts(line)]
         if name in MESH_KEYWORDS:
@@ -642,9 +644,11 @@ def _uses(state: DeckState, left_out: set[str]) -> list[KeywordUse]:
                 reason = "the state without load" if is_used else "statics does not ask for it"
                 place = line.keyword.place
                 uses.append(KeywordUse(f"*{name}, TYPE={kind}", 1, place, is_used, reason))
-        elif name in known or name in _REFUSED or name.startswith("CONTACT "):
-            if now or is_frame:
-                uses.append(use_of(lines if is_frame else now, True, known.get(name, "")))
+        elif name in known_keywords or name in _REFUSED or name.startswith("CONTACT "):
+            if current_lines or is_frame:
+                uses.append(
+                    use_of(lines if is_frame else current_lines, True, known_keywords.get(name, ""))
+                )
             if others:
                 place = others[0].keyword.place
                 reason = "it is of another step"
@@ -660,14 +664,18 @@ def _uses(state: DeckState, left_out: set[str]) -> list[KeywordUse]:
                 "it is of another step" if is_step else _MISSED.get(name, "it is not known here")
             )
             uses.append(use_of(lines, False, reason))
-    nonlinear = [
+    nonlinear_keywords = [
         line.keyword.place
         for line in model.lines_of("STEP")
         if line.keyword.options.get("NLGEOM", "NO").upper() != "NO"
     ]
-    if nonlinear:
+    if nonlinear_keywords:
         reason = "displacements are taken to be small"
-        uses.append(KeywordUse("*STEP, NLGEOM", len(nonlinear), nonlinear[0], False, reason, True))
+        uses.append(
+            KeywordUse(
+                "*STEP, NLGEOM", len(nonlinear_keywords), nonlinear_keywords[0], False, reason, True
+            )
+        )
     return uses
 
 

@@ -81,8 +81,8 @@ class DeckMaterial:
                 f"{self.place}: *MATERIAL {self.name!r} has no *ELASTIC: give E and nu."
             )
         E, nu, at = self.elastic[np.argsort(self.elastic[:, 2])].T
-        varies = np.ptp(T) > _EQUAL * max(float(np.abs(T).max()), 1.0)
-        if not callable(alpha) and not (len(self.elastic) > 1 and varies):
+        is_variable = np.ptp(T) > _EQUAL * max(float(np.abs(T).max()), 1.0)
+        if not callable(alpha) and not (len(self.elastic) > 1 and is_variable):
             E_of_body, nu_of_body = (float(np.interp(T[0], at, v)) for v in (E, nu))
             return Isotropic(E_of_body, nu_of_body, plane, self.yield_stress, alpha=alpha)
         low, high = np.interp([T.min(), T.max()], at, nu)
@@ -120,9 +120,9 @@ class MeanExpansion:
         """At points `(q,)`."""
         T, T_0 = self.field(x), self.initial_field(x)
         change = T - T_0
-        small = np.abs(change) <= _EQUAL * np.maximum(np.abs(T), 1.0)
-        T = np.where(small, T_0 + 1e-3, T)
-        return np.asarray(self.material.strain(T, T_0) / np.where(small, 1e-3, change))
+        is_small = np.abs(change) <= _EQUAL * np.maximum(np.abs(T), 1.0)
+        T = np.where(is_small, T_0 + 1e-3, T)
+        return np.asarray(self.material.strain(T, T_0) / np.where(is_small, 1e-3, change))
 
 
 class DeckBody:
@@ -177,10 +177,12 @@ class DeckBody:
         ]
         source = model.path.name
         self.raw: RawMesh = model.raw_mesh([*facets, *cells])
-        linear = linear_mesh(self.raw, source, strict=False)
-        points, simplices, facet_sets, self._cell_sets, self._number = mesh_parts(linear, source)
+        linear_raw = linear_mesh(self.raw, source, strict=False)
+        points, simplices, facet_sets, self._cell_sets, self._number = mesh_parts(
+            linear_raw, source
+        )
         mesh = Mesh(points, simplices, facet_sets)
-        mesh = with_curved_edges(mesh, linear, self._number)
+        mesh = with_curved_edges(mesh, linear_raw, self._number)
         self.mesh = with_stored_curves(mesh, model.path)
         ends = model.edge_of_middle_node()
         self._ends = np.full((len(model.points), 2), -1, dtype=np.int64)
@@ -220,10 +222,10 @@ class DeckBody:
         self.thickness = thicknesses.pop() if thicknesses else 1.0
         sections = {name: np.unique(np.concatenate(rows)) for name, rows in members.items()}
         sections = {name: rows for name, rows in sections.items() if len(rows)}
-        missing = len(np.setdiff1d(every, np.concatenate([every[:0], *sections.values()])))
-        if sections and missing:
+        n_missing = len(np.setdiff1d(every, np.concatenate([every[:0], *sections.values()])))
+        if sections and n_missing:
             raise ProblemError(
-                f"{self.model.path.name}: {missing} of {len(every)} elements have no *SOLID "
+                f"{self.model.path.name}: {n_missing} of {len(every)} elements have no *SOLID "
                 "SECTION: give them a material."
             )
         if not sections and len(self.materials) == 1:
@@ -249,8 +251,8 @@ class DeckBody:
 
     def function_of(self, values: Floats, name: str) -> Any:
         """`point_field`, a function also where the value is one."""
-        made = self.point_field(values, name)
-        return made if callable(made) else OfTemperature(_zero, (0.0,), (made,))
+        field = self.point_field(values, name)
+        return field if callable(field) else OfTemperature(_zero, (0.0,), (field,))
 
     def nodes_of_material(self, key: str) -> Ints:
         """Nodes of the elements of a material."""
@@ -307,10 +309,10 @@ class DeckBody:
     @cached_property
     def is_bare(self) -> Any:
         """Which middles of edges, numbered after all points, are no nodes of the deck `(n,)`."""
-        bare = np.ones(len(self.places), dtype=bool)
-        bare[: self.mesh.n_points] = False
-        bare[self.nodes(np.nonzero(self._ends[:, 0] >= 0)[0])] = False
-        return bare
+        is_bare = np.ones(len(self.places), dtype=bool)
+        is_bare[: self.mesh.n_points] = False
+        is_bare[self.nodes(np.nonzero(self._ends[:, 0] >= 0)[0])] = False
+        return is_bare
 
     def edges_of(self, facets: Ints) -> Ints:
         """Numbers of the edges of facets, after all points `(k, 1 or 3)`."""
@@ -322,8 +324,8 @@ class DeckBody:
         mesh = self.mesh
         keys = mesh.edges @ [mesh.n_points, 1]
         order = np.argsort(keys)
-        sought = np.sort(ends, axis=1) @ [mesh.n_points, 1]
-        return np.asarray(mesh.n_points + order[np.searchsorted(keys, sought, sorter=order)])
+        keys_of_edges = np.sort(ends, axis=1) @ [mesh.n_points, 1]
+        return np.asarray(mesh.n_points + order[np.searchsorted(keys, keys_of_edges, sorter=order)])
 
     # --- values over it
 
@@ -358,12 +360,14 @@ class DeckBody:
         rows = np.nonzero(self._number[: len(values)] >= 0)[0]
         result[self._number[rows]] = values[rows]
         for point in np.nonzero(np.isnan(result))[0].tolist():
-            around = np.unique(mesh.cells[(mesh.cells == point).any(axis=1)])
-            result[point] = np.nanmean(result[around])
+            neighbours = np.unique(mesh.cells[(mesh.cells == point).any(axis=1)])
+            result[point] = np.nanmean(result[neighbours])
         if np.ptp(result) <= _EQUAL * np.abs(result).max():
             return float(result[0])
-        plain = sound_mesh(mesh.points, mesh.cells)
-        return Field(plain, plain.cells, lock(result), f"{name} of {self.model.path.name}")
+        straight_mesh = sound_mesh(mesh.points, mesh.cells)
+        return Field(
+            straight_mesh, straight_mesh.cells, lock(result), f"{name} of {self.model.path.name}"
+        )
 
     def finished_mesh(self, more_facets: Mapping[str, Ints]) -> Mesh:
         """The mesh with further facet sets, and with cell sets of deck and materials."""
@@ -379,20 +383,20 @@ class DeckBody:
 
     def facets_within(self, numbers: Ints) -> Ints:
         """Facets of the boundary all of whose nodes are among these `(k, d)`."""
-        inside = np.zeros(len(self.places), dtype=bool)
-        inside[numbers] = True
+        is_inside = np.zeros(len(self.places), dtype=bool)
+        is_inside[numbers] = True
         facets = self.mesh.boundary
-        facets = facets[inside[facets].all(axis=1)]
+        facets = facets[is_inside[facets].all(axis=1)]
         if len(facets):
             edges = self.edges_of(facets)
-            facets = facets[(inside[edges] | self.is_bare[edges]).all(axis=1)]
+            facets = facets[(is_inside[edges] | self.is_bare[edges]).all(axis=1)]
         return facets
 
     def name_of_facets(self, facets: Ints, names: Iterable[tuple[str, Ints]]) -> str:
         """Name of the first facet set that has these facets; empty where none has."""
-        sought = np.unique(numbers_of(self.mesh, facets))
+        facet_numbers = np.unique(numbers_of(self.mesh, facets))
         for name, members in names:
-            if np.array_equal(np.unique(numbers_of(self.mesh, members)), sought):
+            if np.array_equal(np.unique(numbers_of(self.mesh, members)), facet_numbers):
                 return name
         return ""
 
@@ -418,16 +422,16 @@ def _plane_state(model: AbaqusModel) -> str | None:
 
 def _materials(model: AbaqusModel) -> dict[str, DeckMaterial]:
     by_name: dict[str, dict[str, Keyword]] = {}
-    current: dict[str, Keyword] = {}
+    keywords_of_material: dict[str, Keyword] = {}
     for line in model.lines:
         keyword = line.keyword
         if keyword.name == "MATERIAL":
-            current = by_name.setdefault(keyword.option("NAME").casefold(), {})
-            current["MATERIAL"] = keyword
+            keywords_of_material = by_name.setdefault(keyword.option("NAME").casefold(), {})
+            keywords_of_material["MATERIAL"] = keyword
         elif keyword.name in _PROPERTIES:
-            current[keyword.name] = keyword
+            keywords_of_material[keyword.name] = keyword
         elif keyword.name in MESH_KEYWORDS or keyword.name == "SOLID SECTION":
-            current = {}
+            keywords_of_material = {}
     return {name: _material(parts) for name, parts in by_name.items()}
 
 
@@ -445,8 +449,10 @@ def _material(parts: dict[str, Keyword]) -> DeckMaterial:
         zero = expansion.number(expansion.options.get("ZERO", ""), expansion.line, "ZERO", 0.0)
     rows = {name: _columns(parts[name], 3) if name in parts else np.zeros((0, 3))
             for name in _PROPERTIES}  # fmt: skip
-    density, plastic = rows["DENSITY"], rows["PLASTIC"]
-    yield_stress = float(plastic[0, 0]) if len(plastic) and plastic[0, 0] > 0 else None
+    density, plastic_rows = rows["DENSITY"], rows["PLASTIC"]
+    yield_stress = (
+        float(plastic_rows[0, 0]) if len(plastic_rows) and plastic_rows[0, 0] > 0 else None
+    )
     return DeckMaterial(
         head.option("NAME"), head.place, rows["ELASTIC"], rows["EXPANSION"][:, :2], zero,
         float(density[0, 0]) if len(density) else 0.0, yield_stress,

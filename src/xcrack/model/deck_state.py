@@ -64,8 +64,8 @@ def steps_of(model: AbaqusModel) -> tuple[DeckStep, ...]:
     for line in model.lines_of("STEP"):
         n = len(steps) + 1
         names = ("STATIC", *_OTHER_PROCEDURES)
-        within = (each.keyword for each in model.lines if each.step == n)
-        procedure = next((keyword for keyword in within if keyword.name in names), None)
+        keywords = (each.keyword for each in model.lines if each.step == n)
+        procedure = next((keyword for keyword in keywords if keyword.name in names), None)
         is_static = procedure is None or procedure.name == "STATIC"
         period = 1.0
         for number, row in procedure.rows if procedure is not None and is_static else ():
@@ -258,14 +258,14 @@ class DeckState:
             "COUPLING": self._take_coupling,
             "INITIAL CONDITIONS": self._take_initial,
         }
-        later: dict[str, Callable[[DeckLine], None]] = {
+        later_readers: dict[str, Callable[[DeckLine], None]] = {
             "BOUNDARY": self._take_boundary,
             "CLOAD": self._take_forces,
             "DLOAD": self._take_spread,
             "DSLOAD": self._take_spread,
             "TEMPERATURE": self._take_temperature,
         }
-        for readers in (first, later):
+        for readers in (first, later_readers):
             for line in model.lines:
                 name = line.keyword.name
                 if name in readers and name not in left_out and self.counts(line):
@@ -282,8 +282,8 @@ class DeckState:
             return False
         if line.step == self.step.number:
             return True
-        earlier = self.steps[line.step - 1]
-        if not earlier.is_static or earlier.is_perturbation:
+        earlier_step = self.steps[line.step - 1]
+        if not earlier_step.is_static or earlier_step.is_perturbation:
             return False
         return line.keyword.name == "BOUNDARY" or not self.step.is_perturbation
 
@@ -316,24 +316,24 @@ class DeckState:
         keyword, name = line.keyword, line.keyword.options.get("AMPLITUDE", "")
         if not name or line.step is None or self.step is None:
             return 1.0
-        known = self.amplitudes.get(name.casefold())
-        if known is None or not len(known.table):
-            words = "there is none of that name" if known is None else (
-                f"it ({known.keyword.place}) is no table of times and values"
+        amplitude = self.amplitudes.get(name.casefold())
+        if amplitude is None or not len(amplitude.table):
+            words = "there is none of that name" if amplitude is None else (
+                f"it ({amplitude.keyword.place}) is no table of times and values"
             )  # fmt: skip
             keyword.refuse(
                 f"AMPLITUDE={name}: {words}: write it as DEFINITION=TABULAR.", error=ProblemError
             )
         step = self.steps[line.step - 1]
-        is_now = step.number == self.step.number or known.is_total
-        step = self.step if known.is_total else step
+        is_now = step.number == self.step.number or amplitude.is_total
+        step = self.step if amplitude.is_total else step
         time = self.time if is_now and self.time is not None else step.period
-        return known.value(time + (step.begin if known.is_total else 0.0))
+        return amplitude.value(time + (step.begin if amplitude.is_total else 0.0))
 
     def _take_coupling(self, line: DeckLine) -> None:
         keyword = line.keyword
-        following = self.model.lines[self.model.lines.index(line) + 1 :][:1]
-        kind = following[0].keyword if following else keyword
+        next_lines = self.model.lines[self.model.lines.index(line) + 1 :][:1]
+        kind = next_lines[0].keyword if next_lines else keyword
         if kind.name not in ("DISTRIBUTING", "KINEMATIC"):
             keyword.refuse("*DISTRIBUTING or *KINEMATIC must follow it.", error=ProblemError)
         axes = {axis for number, row in kind.rows for axis in _axes(kind, ["", *row], number)}
@@ -352,8 +352,8 @@ class DeckState:
             keyword.refuse("velocities and accelerations are no statics.", error=ProblemError)
         step = line.step or 0
         if keyword.options.get("OP", "").upper() == "NEW":
-            now = [n for n, one in enumerate(self.restraints) if one.step == step]
-            self.owner[~np.isin(self.owner, now)] = -1
+            current_numbers = [n for n, one in enumerate(self.restraints) if one.step == step]
+            self.owner[~np.isin(self.owner, current_numbers)] = -1
         is_base = self.step is not None and self.step.is_perturbation and step != self.step.number
         factor = 0.0 if is_base else self._factor(line)
         by_number: dict[tuple[int, ...], int] = {}
@@ -386,13 +386,13 @@ class DeckState:
     ) -> None:  # fmt: skip
         """Raise where a direction of a node is given two values in one step."""
         owner = self.owner[axis, rows]
-        given = owner >= 0
-        given[given] = [self.restraints[n].step == step for n in owner[given].tolist()]
-        other = self.value[axis, rows[given]]
+        has_owner = owner >= 0
+        has_owner[has_owner] = [self.restraints[n].step == step for n in owner[has_owner].tolist()]
+        other = self.value[axis, rows[has_owner]]
         if (
             np.abs(other - value) > 1e-9 * max(abs(value), float(np.abs(other).max(initial=0)))
         ).any():
-            first = self.restraints[int(owner[given][0])].place
+            first = self.restraints[int(owner[has_owner][0])].place
             keyword.refuse(
                 f"direction {axis + 1} of {name} is given {value:g} here and another value in "
                 f"{first}: leave one of them out.", number, ProblemError
@@ -433,8 +433,11 @@ class DeckState:
             if len(row) < 2:
                 keyword.refuse("give a set, a kind of load and a value.", number, ProblemError)
             label = row[1].upper()
-            given = [keyword.number(entry, number, "a number", 0.0) for entry in row[2:]]
-            value, numbers = factor * (given[0] if given else 0.0), tuple(given[1:])
+            numbers_of_row = [keyword.number(entry, number, "a number", 0.0) for entry in row[2:]]
+            value, numbers = (
+                factor * (numbers_of_row[0] if numbers_of_row else 0.0),
+                tuple(numbers_of_row[1:]),
+            )
             elements, faces, label = self._loaded_faces(line, number, row[0], label)
             by_number = keyword.name == "DLOAD" and row[0].rpartition(".")[2].isdigit()
             target = "" if by_number else row[0]
@@ -486,13 +489,13 @@ class DeckState:
             self._set_temperature(line, self.initial_temperature, 1.0)
         elif kind == "STRESS":
             for number, row in keyword.rows:
-                given = [keyword.number(entry, number, "a stress", 0.0) for entry in row[1:]]
-                if len(given) > 6:
+                components = [keyword.number(entry, number, "a stress", 0.0) for entry in row[1:]]
+                if len(components) > 6:
                     keyword.refuse(
                         "stresses of integration points are not read: give those of sets of "
                         "elements.", number, ProblemError
                     )  # fmt: skip
-                xx, yy, zz, xy, xz, yz = (*given, *[0.0] * (6 - len(given)))
+                xx, yy, zz, xy, xz, yz = (*components, *[0.0] * (6 - len(components)))
                 stress = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
                 self.stresses.append((self.model.elements_of(row[0], line, number), stress))
 

@@ -139,8 +139,8 @@ class Elasticity:
         values = np.ones(nodes.shape)
         for material, cells in self.groups(np.arange(len(self.mesh.cells))):
             if material.is_graded:
-                used, place = np.unique(nodes[cells], return_inverse=True)
-                moduli = material.moduli(points[used], used)  # type: ignore[attr-defined]
+                numbers, place = np.unique(nodes[cells], return_inverse=True)
+                moduli = material.moduli(points[numbers], numbers)  # type: ignore[attr-defined]
                 values[cells] = moduli[place.reshape(len(cells), -1)]
         return lock(values)
 
@@ -183,7 +183,7 @@ class Elasticity:
         return [(self.materials[k], cells[number == k]) for k in np.unique(number).tolist()]
 
     def at_points(
-        self, cell: Ints, bary: Floats, exact: bool = False
+        self, cell: Ints, bary: Floats, is_exact: bool = False
     ) -> Iterator[tuple[Rows, Material]]:
         """Points by material: their rows, and the material as it is there.
 
@@ -191,10 +191,10 @@ class Elasticity:
         ----------
         cell : (q,) array of int
         bary : (q, d + 1) array
-        exact : bool
+        is_exact : bool
             A graded modulus is the quadratic one, not that of the stiffness.
         """
-        factor = self.moduli(cell, bary) if exact else self.factors(cell, bary)
+        factor = self.moduli(cell, bary) if is_exact else self.factors(cell, bary)
         numbers = [0] if not len(self.number) else np.unique(self.number[cell]).tolist()
         for k in numbers:
             rows = np.nonzero(self.number[cell] == k)[0] if len(self.number) else slice(None)
@@ -354,12 +354,12 @@ class Elasticity:
         (q, d, d, n) array, stress
         """
         result = np.zeros_like(gradient)
-        differs = np.zeros(len(self.mesh.cells), dtype=bool)
-        differs[self.differing(material, np.arange(len(differs)))] = True
-        rows = np.nonzero(differs[cell])[0]
+        is_different = np.zeros(len(self.mesh.cells), dtype=bool)
+        is_different[self.differing(material, np.arange(len(is_different)))] = True
+        rows = np.nonzero(is_different[cell])[0]
         for n in range(gradient.shape[3] if len(rows) else 0):
             local = np.ascontiguousarray(gradient[rows, :, :, n])
-            for part, one in self.at_points(cell[rows], bary[rows], exact=True):
+            for part, one in self.at_points(cell[rows], bary[rows], is_exact=True):
                 change = one.stress(local[part]) - material.stress(local[part])
                 result[rows[part], :, :, n] = change
         return result
@@ -392,11 +392,11 @@ _ROWS = {2: [(0, 0), (1, 1), (0, 1)], 3: [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2)
 
 def _voigt(tensor: Floats, frame: Floats) -> Floats:
     """Stiffness `(v, v)` along the rows of a frame, of a tensor `(d, d, d, d)`."""
-    turned = tensor
+    rotated = tensor
     if isotropic_part(tensor)[2] is not None:
-        turned = np.einsum("ai,bj,ck,dl,ijkl->abcd", frame, frame, frame, frame, tensor)
+        rotated = np.einsum("ai,bj,ck,dl,ijkl->abcd", frame, frame, frame, frame, tensor)
     i, j = np.array(_ROWS[len(tensor)]).T
-    return turned[i[:, None], j[:, None], i, j]
+    return rotated[i[:, None], j[:, None], i, j]
 
 
 def elasticity(mesh: Mesh, material: Material) -> Elasticity:
@@ -408,15 +408,19 @@ def elasticity(mesh: Mesh, material: Material) -> Elasticity:
         Sets that the mesh does not have, that are empty, overlap or leave cells out; a graded
         modulus that is not above 0 somewhere.
     """
-    nothing, named = lock(np.zeros(0, dtype=np.int64)), material.named
-    set_number = _set_numbers(mesh, [name for name, _ in named]) if named[0][0] else nothing
-    keys = [_key(one) for _, one in named]
-    distinct = list(dict.fromkeys(keys))
-    materials = tuple(named[keys.index(key)][1] for key in distinct)
+    nothing, material_by_set = lock(np.zeros(0, dtype=np.int64)), material.named
+    set_number = (
+        _set_numbers(mesh, [name for name, _ in material_by_set])
+        if material_by_set[0][0]
+        else nothing
+    )
+    keys = [_key(one) for _, one in material_by_set]
+    distinct_keys = list(dict.fromkeys(keys))
+    materials = tuple(material_by_set[keys.index(key)][1] for key in distinct_keys)
     number = nothing
-    if len(distinct) > 1:
-        number = lock(np.array([distinct.index(key) for key in keys])[set_number])
-    result = Elasticity(mesh, material, materials, number, named, set_number)
+    if len(distinct_keys) > 1:
+        number = lock(np.array([distinct_keys.index(key) for key in keys])[set_number])
+    result = Elasticity(mesh, material, materials, number, material_by_set, set_number)
     _ = result.factor  # refuses values that are no modulus
     return result
 
@@ -441,19 +445,20 @@ def _set_numbers(mesh: Mesh, names: list[str]) -> Ints:
             raise ProblemError(
                 f"material: the cell set {name!r} is empty: leave it out, or give it cells."
             )
-        twice = members[number[members] >= 0]
-        if len(twice):
-            other = names[int(number[twice[0]])]
+        double_cells = members[number[members] >= 0]
+        if len(double_cells):
+            other = names[int(number[double_cells[0]])]
             raise ProblemError(
-                f"material: {len(twice)} cells, one at {_cell_middle(mesh, twice[0])}, are in "
-                f"{other!r} and in {name!r}: give each cell one material."
+                f"material: {len(double_cells)} cells, one at "
+                f"{_cell_middle(mesh, double_cells[0])}, are in {other!r} and in {name!r}: "
+                "give each cell one material."
             )
         number[members] = k
-    bare: Bools = number < 0
-    if bare.any():
+    has_no_material: Bools = number < 0
+    if has_no_material.any():
         raise ProblemError(
-            f"material: {int(bare.sum())} cells, one at "
-            f"{_cell_middle(mesh, int(np.argmax(bare)))}, are in none of the sets "
+            f"material: {int(has_no_material.sum())} cells, one at "
+            f"{_cell_middle(mesh, int(np.argmax(has_no_material)))}, are in none of the sets "
             f"{', '.join(map(repr, names))}: give every cell a material."
         )
     return lock(number)

@@ -299,36 +299,36 @@ class bearing(Load):  # noqa: N801
             A force along the axis, or a set that lacks a part of the contact.
         """
         hole = self._hole(points.mesh, points.facets)
-        given, x, weight = np.asarray(self.force), points.x, points.weight
-        force = hole.section @ given
-        size = float(np.linalg.norm(given))
-        remainder = given - force @ hole.section
-        along = float(np.linalg.norm(remainder))
-        if along > _AXIAL * size:
+        force_in_space, x, weight = np.asarray(self.force), points.x, points.weight
+        force = hole.section @ force_in_space
+        size = float(np.linalg.norm(force_in_space))
+        remainder = force_in_space - force @ hole.section
+        axial_force = float(np.linalg.norm(remainder))
+        if axial_force > _AXIAL * size:
             raise ProblemError(
-                f"{self.name}: {along:.4g} of the force {size:.4g} acts along the axis of the "
-                "hole, where a pin does not press: give that part by traction or resultant."
+                f"{self.name}: {axial_force:.4g} of the force {size:.4g} acts along the axis of "
+                "the hole, where a pin does not press: give that part by traction or resultant."
             )
         local = hole.local(x)
-        radial = local / np.linalg.norm(local, axis=1)[:, None]
-        ahead = force / np.linalg.norm(force)
-        across = np.array([-ahead[1], ahead[0]])
-        cosine, sine = radial @ ahead, radial @ across
+        direction = local / np.linalg.norm(local, axis=1)[:, None]
+        load_direction = force / np.linalg.norm(force)
+        cross_direction = np.array([-load_direction[1], load_direction[0]])
+        cosine, sine = direction @ load_direction, direction @ cross_direction
         angle = np.arctan2(sine, cosine)
         half = self.contact_angle / 2
         p = np.where(np.abs(angle) < half, np.cos(np.pi * angle / self.contact_angle), 0.0)
-        height = np.ptp(x @ np.cross(*hole.section)) if len(given) > 2 else 1.0
-        pressed = float(weight[np.abs(angle) < half].sum())
+        height = np.ptp(x @ np.cross(*hole.section)) if len(force_in_space) > 2 else 1.0
+        loaded_area = float(weight[np.abs(angle) < half].sum())
         # Points of integration do not reach the ends of the hole: its height is a little larger.
         bearing_area = self.contact_angle * hole.radius * height
-        if pressed < _COVERED * bearing_area:
+        if loaded_area < _COVERED * bearing_area:
             raise ProblemError(
-                f"{self.name}: the set covers {100 * pressed / bearing_area:.3g} % of where the "
-                f"pin presses, {np.degrees(self.contact_angle):.4g} degrees around the force: give "
-                f"the whole hole, or a smaller contact_angle."
+                f"{self.name}: the set covers {100 * loaded_area / bearing_area:.3g} % of where "
+                f"the pin presses, {np.degrees(self.contact_angle):.4g} degrees around the force: "
+                f"give the whole hole, or a smaller contact_angle."
             )
         # On a polygon the cosine alone would pull a little to one side.
-        shapes = np.stack([p, p * sine])[:, :, None] * radial
+        shapes = np.stack([p, p * sine])[:, :, None] * direction
         sums = np.einsum("q,kqs->sk", weight, shapes)
         scale = np.linalg.solve(sums, force)
         across_axis = np.einsum("k,kqs->qs", scale, shapes) @ hole.section
@@ -412,7 +412,7 @@ class resultant(Load):  # noqa: N801
         """
         x, weight = points.x, points.weight
         d = x.shape[1]
-        force, moment, about = np.zeros(3), np.zeros(3), np.zeros(3)
+        force, moment, moment_point = np.zeros(3), np.zeros(3), np.zeros(3)
         area = weight.sum()
         centre = weight @ x / area
         r = np.zeros((len(x), 3))
@@ -422,9 +422,9 @@ class resultant(Load):  # noqa: N801
         if self.moment is not None:
             moment[3 - np.size(self.moment) :] = self.moment
         if self.about is not None:
-            about[:d] = self.about - centre
+            moment_point[:d] = self.about - centre
             # Moment about the centre of the set, where the force acts otherwise.
-            moment = moment + np.cross(about, force)
+            moment = moment + np.cross(moment_point, force)
         inertia = np.einsum("q,q,ij->ij", weight, (r * r).sum(axis=1), np.eye(3))
         inertia -= np.einsum("q,qi,qj->ij", weight, r, r)
         turn = np.zeros(3)
@@ -681,11 +681,11 @@ class temperature(Load):  # noqa: N801
     def check(self, problem: Any) -> None:
         """Raise where a material has no alpha, or where there are several beside one alpha."""
         super().check(problem)
-        named = problem.elasticity.named
+        material_by_set = problem.elasticity.named
         if self.alpha is None:
-            for _, material in named:
+            for _, material in material_by_set:
                 material.expansion(problem.mesh.points[:1])
-        elif len(named) > 1:
+        elif len(material_by_set) > 1:
             raise ProblemError(
                 f"temperature(alpha={self.alpha:g}): the body has several materials: leave alpha "
                 "out, and give each its own, Isotropic(..., alpha=...)."

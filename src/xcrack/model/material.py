@@ -193,8 +193,8 @@ class Material(Declared):
 
         Alpha is a number, or one at each point `(n,)`.
         """
-        stiff = -self._plane_stiffness()[:, :3].sum(axis=1)[_VOIGT[:dim, :dim]]
-        return np.asarray(_by_point(alpha) * change[:, None, None] * stiff)
+        stiffness = -self._plane_stiffness()[:, :3].sum(axis=1)[_VOIGT[:dim, :dim]]
+        return np.asarray(_by_point(alpha) * change[:, None, None] * stiffness)
 
     def constraint(self, thickness: float, square: float) -> str:
         """Whether a plastic zone is that of plane "strain" or of plane "stress".
@@ -366,8 +366,8 @@ class Isotropic(Material):
 
     def thermal_stress(self, change: Floats, alpha: Any, dim: int) -> Floats:
         """Stress `(n, dim, dim)` of a change of temperature `(n,)` that cannot expand."""
-        stiff = -self.E / (1 - self.nu if self.plane == "stress" else 1 - 2 * self.nu)
-        return np.asarray(_by_point(alpha) * stiff * change[:, None, None] * np.eye(dim))
+        stiffness = -self.E / (1 - self.nu if self.plane == "stress" else 1 - 2 * self.nu)
+        return np.asarray(_by_point(alpha) * stiffness * change[:, None, None] * np.eye(dim))
 
     def stress(self, gradient: Floats) -> Floats:
         """Stress `(..., d, d)` of a displacement gradient `(..., d, d)` (row: component)."""
@@ -409,8 +409,8 @@ def _words(value: Any) -> str:
 
 def _text(material: Any) -> str:
     """What was given to make it."""
-    given = {f.name: getattr(material, f.name) for f in fields(material)}
-    parts = [f"{name}={_words(value)}" for name, value in given.items() if value is not None]
+    values = {f.name: getattr(material, f.name) for f in fields(material)}
+    parts = [f"{name}={_words(value)}" for name, value in values.items() if value is not None]
     return f"{material.kind}({', '.join(parts)})"
 
 
@@ -439,8 +439,10 @@ class StoredFunction:
 
 def at_nodes(modulus: Any, nodes: Ints) -> Any:
     """A modulus as a function of nodes, in their order: a stored one knows no other points."""
-    stored = isinstance(modulus, StoredFunction) and nodes.max(initial=0) < len(modulus.values)
-    values = modulus.values[nodes] if stored else None
+    values_at_points = isinstance(modulus, StoredFunction) and nodes.max(initial=0) < len(
+        modulus.values
+    )
+    values = modulus.values[nodes] if values_at_points else None
     if values is None or not np.isfinite(values).all():
         return modulus
     return lambda x: values
@@ -575,9 +577,9 @@ class ScaledMaterial(Material):
     factor : (q,) array
     """
 
-    def __init__(self, graded: Material, factor: Floats) -> None:
-        self.graded, self.unit_material, self.factor = graded, graded.unit, factor
-        self.plane = graded.plane
+    def __init__(self, graded_material: Material, factor: Floats) -> None:
+        self.graded, self.unit_material, self.factor = graded_material, graded_material.unit, factor
+        self.plane = graded_material.plane
 
     def expansion(self, x: Floats) -> Any:
         """Coefficient of thermal expansion at the points."""
@@ -670,8 +672,8 @@ class MaterialSets(Material):
     @property
     def yield_stress(self) -> float | None:  # type: ignore[override]
         """Yield stress of the weakest of those whose yield stress is known."""
-        given = (m.yield_stress for _, m in self.materials if m.yield_stress is not None)
-        return min(given, default=None)
+        limits = (m.yield_stress for _, m in self.materials if m.yield_stress is not None)
+        return min(limits, default=None)
 
     def with_yield_stress(self, yield_stress: float) -> "MaterialSets":
         """All of them, judged by one yield stress."""

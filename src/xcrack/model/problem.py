@@ -87,15 +87,16 @@ def friction_coefficients(
     """Coefficients of friction, checked: one for all cracks, or one for each."""
     if isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
         return number(value, what, least=0, most=_MOST, error=error)
-    wrong = f"{what} = {value_text(value)}: give a number, or a list of one a crack."
+    message = f"{what} = {value_text(value)}: give a number, or a list of one a crack."
     if isinstance(value, AnySet):
-        raise error(wrong)
+        raise error(message)
     try:
-        given = entries(value, what, error=error)
+        given_values = entries(value, what, error=error)
     except error:
-        raise error(wrong) from None
+        raise error(message) from None
     return tuple(
-        number(mu, f"{what}[{c}]", least=0, most=_MOST, error=error) for c, mu in enumerate(given)
+        number(mu, f"{what}[{c}]", least=0, most=_MOST, error=error)
+        for c, mu in enumerate(given_values)
     )
 
 
@@ -208,8 +209,8 @@ _ORDER_OF_RUBBING = 1  # in 3D: order 2 takes 3 to 10 times as long there, K_II 
 
 def order_left_out(problem: "Problem") -> int:
     """Order of a problem that does not say one."""
-    rubs = problem.mesh.dim == 3 and problem.contact != "off" and any(problem.frictions)
-    return _ORDER_OF_RUBBING if rubs else _ORDER
+    has_friction = problem.mesh.dim == 3 and problem.contact != "off" and any(problem.frictions)
+    return _ORDER_OF_RUBBING if has_friction else _ORDER
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,8 +282,8 @@ class Problem(Declared):
     @cached_property
     def elasticity(self) -> Elasticity:
         """What each cell is made of."""
-        given: Any = self.material  # a mapping has become MaterialSets
-        return elasticity(self.mesh, given)
+        material: Any = self.material  # a mapping has become MaterialSets
+        return elasticity(self.mesh, material)
 
     @cached_property
     def placed(self) -> tuple[Crack, ...]:
@@ -334,9 +335,11 @@ class Problem(Declared):
             for load in state.steady:
                 self._check_load(load)
             scaled_loads = scaled_state(self.loads, state.factor)  # type: ignore[arg-type]
-            steady = state.steady
+            steady_loads = state.steady
             return LoadState(
-                scaled_loads.loads + steady, scaled_loads.factors + (1.0,) * len(steady), 1.0
+                scaled_loads.loads + steady_loads,
+                scaled_loads.factors + (1.0,) * len(steady_loads),
+                1.0,
             )
         if isinstance(state, Real | np.ndarray) or np.isscalar(state):
             factor = _FACTOR.check(state, "load state", ProblemError)
@@ -396,8 +399,8 @@ class Problem(Declared):
         """Outline of the body and its cracks, as SVG."""
         with suppress(CoarseMeshError):  # then as they were given
             _ = self.placed
-        shown = self.__dict__.get("placed", self.cracks)
-        cracks = [rim(crack.points, crack.faces) for crack in shown]
+        drawn_cracks = self.__dict__.get("placed", self.cracks)
+        cracks = [rim(crack.points, crack.faces) for crack in drawn_cracks]
         return sketch(self.mesh.points, self.mesh.boundary, cracks)
 
     def _check_members(self) -> None:

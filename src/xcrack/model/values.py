@@ -30,10 +30,10 @@ class VectorField(Rule):
         """The function, a read-only vector, or a tuple with None."""
         if callable(value):
             return value
-        given = self.free and isinstance(value, list | tuple)
-        if given and len(value) in (2, 3) and all(v is None for v in value):
+        is_sequence = self.free and isinstance(value, list | tuple)
+        if is_sequence and len(value) in (2, 3) and all(v is None for v in value):
             raise error(f"{what} = {value_text(value)}: give a number in one direction or more.")
-        if given and any(v is None or callable(v) for v in value) and len(value) in (2, 3):
+        if is_sequence and any(v is None or callable(v) for v in value) and len(value) in (2, 3):
             return tuple(
                 v if v is None or callable(v) else number(v, f"{what}[{i}]", error=error)
                 for i, v in enumerate(value)
@@ -170,15 +170,15 @@ def scalar_at(value: Any, x: Floats, what: str) -> Floats:
         Another shape, or values that are not finite.
     """
     if callable(value):
-        given = _real_values(call_function(value, f"the value of {what}", x), what)
+        values = _real_values(call_function(value, f"the value of {what}", x), what)
     else:
-        given = numbers(value, what)
-    if given.shape not in ((), (len(x),)):
+        values = numbers(value, what)
+    if values.shape not in ((), (len(x),)):
         raise ProblemError(
-            f"{what}: the value has shape {given.shape}, wanted {(len(x),)}; give a number or a "
+            f"{what}: the value has shape {values.shape}, wanted {(len(x),)}; give a number or a "
             "function that returns (n,)."
         )
-    result = np.broadcast_to(given, (len(x),))
+    result = np.broadcast_to(values, (len(x),))
     _check_finite(result, x, what)
     return result
 
@@ -203,9 +203,9 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
         )
     result = np.broadcast_to(result, (len(x), d, d))
     _check_finite(result, x, what)
-    skew = np.abs(result - np.swapaxes(result, 1, 2)).max(axis=(1, 2), initial=0)
-    if (skew > 1e-8 * np.abs(result).max(initial=0.0)).any():
-        where = int(np.argmax(skew))
+    asymmetry = np.abs(result - np.swapaxes(result, 1, 2)).max(axis=(1, 2), initial=0)
+    if (asymmetry > 1e-8 * np.abs(result).max(initial=0.0)).any():
+        where = int(np.argmax(asymmetry))
         raise ProblemError(
             f"{what}: the value at {np.round(x[where], 9).tolist()} is "
             f"{result[where].tolist()}: a stress must be symmetric."
@@ -215,7 +215,7 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
 
 def _real_values(result: Any, what: str) -> Floats:
     """What a function returned: an array of real numbers; others are looked for later."""
-    return numbers(result, f"{what}: the returned value", finite=False)
+    return numbers(result, f"{what}: the returned value", must_be_finite=False)
 
 
 def _check_finite(result: Floats, x: Floats, what: str) -> None:

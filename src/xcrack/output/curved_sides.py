@@ -72,11 +72,11 @@ class CurvedSides:
         facet : (k',) array of int
         """
         on_curve = (facet >= 0) & (self.facet_to_curve[facet] >= 0)
-        flat = np.nonzero(~on_curve)[0]
-        parts = [(x[flat], data[flat], facet[flat])]
-        curved = np.nonzero(on_curve)[0]
-        for n, rows in self._by_parts(x[curved], facet[curved]):
-            rows = curved[rows]
+        flat_rows = np.nonzero(~on_curve)[0]
+        parts = [(x[flat_rows], data[flat_rows], facet[flat_rows])]
+        curved_rows = np.nonzero(on_curve)[0]
+        for n, rows in self._by_parts(x[curved_rows], facet[curved_rows]):
+            rows = curved_rows[rows]
             nodes, simplices = lattice_parts(x.shape[1], n)
             places = np.einsum("nv,kvd->knd", nodes, x[rows])
             owner = np.repeat(facet[rows], len(nodes))
@@ -87,8 +87,8 @@ class CurvedSides:
                 values[:, simplices].reshape(-1, *data.shape[1:]),
                 np.repeat(facet[rows], len(simplices)),
             ))  # fmt: skip
-        bent, values, owner = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return bent, values, owner
+        points, values, owner = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return points, values, owner
 
     def bend_edges(self, x: Floats, facet: Ints, data: Floats) -> tuple[Floats, Floats]:
         """Triangles beside curved facets, in parts of which those at an edge follow the curve.
@@ -100,9 +100,9 @@ class CurvedSides:
             Curved facet on which the edges 01, 12 and 20 lie; -1 for none.
         data : (k, 3, m) array
         """
-        beside = (facet >= 0).any(axis=1)
-        parts = [(x[~beside], data[~beside])]
-        x, facet, data = x[beside], facet[beside], data[beside]
+        is_beside = (facet >= 0).any(axis=1)
+        parts = [(x[~is_beside], data[~is_beside])]
+        x, facet, data = x[is_beside], facet[is_beside], data[is_beside]
         edges = np.stack([x, np.roll(x, -1, axis=1)], axis=2)
         rows, edge = np.nonzero(facet >= 0)
         every = np.ones(len(x), dtype=np.int64)
@@ -113,21 +113,25 @@ class CurvedSides:
             nodes, simplices = lattice_parts(3, n)
             places = np.einsum("nv,kvd->knd", nodes, x[chosen])
             for e in range(3):
-                has = np.nonzero(facet[chosen, e] >= 0)[0]
-                one, other, away = nodes[:, e], nodes[:, (e + 1) % 3], nodes[:, (e + 2) % 3]
+                has_facet = np.nonzero(facet[chosen, e] >= 0)[0]
+                one, other, opposite_weight = (
+                    nodes[:, e],
+                    nodes[:, (e + 1) % 3],
+                    nodes[:, (e + 2) % 3],
+                )
                 share = other / np.maximum(one + other, 1e-300)
-                a, b = (edges[chosen[has], e, side][:, None] for side in (0, 1))
+                a, b = (edges[chosen[has_facet], e, side][:, None] for side in (0, 1))
                 chord = a + share[:, None] * (b - a)
-                owner = np.repeat(facet[chosen[has], e], len(nodes))
+                owner = np.repeat(facet[chosen[has_facet], e], len(nodes))
                 arc = self.nearest(chord.reshape(-1, x.shape[2]), owner).reshape(chord.shape)
-                places[has] += ((1 - away) ** 2)[:, None] * (arc - chord)
+                places[has_facet] += ((1 - opposite_weight) ** 2)[:, None] * (arc - chord)
             values = np.einsum("nv,kvm->knm", nodes, data[chosen])
             parts.append((
                 places[:, simplices].reshape(-1, 3, x.shape[2]),
                 values[:, simplices].reshape(-1, 3, data.shape[2]),
             ))  # fmt: skip
-        bent, values = (np.concatenate(each) for each in zip(*parts, strict=True))
-        return bent, values
+        points, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return points, values
 
     def facets_of_edges(self, triangles: Ints, segments: Ints, facet: Ints) -> Ints:
         """Curved facets on which the edges of triangles lie `(k, 3)`, -1 for none.
@@ -163,8 +167,8 @@ class CurvedSides:
         for i in range(v):
             for j in range(i):
                 middle = (x[:, i] + x[:, j]) / 2
-                away = np.linalg.norm(self.nearest(middle, facet) - middle, axis=1)
-                height = np.maximum(height, away)
+                offset = np.linalg.norm(self.nearest(middle, facet) - middle, axis=1)
+                height = np.maximum(height, offset)
         halvings = np.clip(np.ceil(np.log2(np.maximum(height / self.off, 1.0)) / 2), 0, None)
         parts = np.minimum(2 ** halvings.astype(np.int64), _MOST_PARTS)
         for n in np.unique(parts):
@@ -175,8 +179,8 @@ def boundary_lines(mesh: Mesh) -> Floats:
     """Edges of the boundary of a 2D mesh `(k, 2, 2)`, in parts where they are curved."""
     outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     x = mesh.points[mesh.facets[outer]]
-    curved = CurvedSides.of(mesh)
-    return x if curved is None else curved.bent(x, outer)
+    sides = CurvedSides.of(mesh)
+    return x if sides is None else sides.bent(x, outer)
 
 
 def lattice_parts(corners: int, n: int) -> tuple[Floats, Ints]:
@@ -209,11 +213,11 @@ def shading_normals(corners: Floats) -> Floats:
     total = np.repeat(normal, 3, axis=0)
     sorted_place = place[order]
     for step_on in range(1, int(np.bincount(place).max(initial=1))):
-        same: Bools = sorted_place[step_on:] == sorted_place[:-step_on]
-        one, other = order[step_on:][same], order[:-step_on][same]
+        is_same: Bools = sorted_place[step_on:] == sorted_place[:-step_on]
+        one, other = order[step_on:][is_same], order[:-step_on][is_same]
         cosine = np.einsum("kd,kd->k", unit[owner[one]], unit[owner[other]])
-        near = np.abs(cosine) > _ALIKE  # triangles run round in either sense
-        one, other, sign = one[near], other[near], np.sign(cosine[near])[:, None]
+        is_aligned = np.abs(cosine) > _ALIKE  # triangles run round in either sense
+        one, other, sign = one[is_aligned], other[is_aligned], np.sign(cosine[is_aligned])[:, None]
         np.add.at(total, one, sign * normal[owner[other]])
         np.add.at(total, other, sign * normal[owner[one]])
     length = np.linalg.norm(total, axis=1)

@@ -70,8 +70,8 @@ class LipFaces:
     @property
     def sliding(self) -> Floats:
         """Length of the tangential jump `(n,)`, length."""
-        along = self.jump - self.gap[:, None] * self.normal
-        return np.asarray(np.linalg.norm(along, axis=1))
+        tangential_jump = self.jump - self.gap[:, None] * self.normal
+        return np.asarray(np.linalg.norm(tangential_jump, axis=1))
 
 
 def lip_faces(solution: Solution, crack: int) -> LipFaces:
@@ -89,22 +89,22 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     space, lips = solution.space, solution.lips[crack]
     cut, mesh = space.cuts[crack], space.mesh
     corners = cut.lip_points(mesh)
-    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(turned, axis=1) / 2
-    over = np.einsum("td,td->t", turned, cut.lip_normal) < 0
+    area_vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(area_vector, axis=1) / 2
+    is_reversed = np.einsum("td,td->t", area_vector, cut.lip_normal) < 0
     number = _merged_numbers(corners.reshape(-1, 3), _SAME * float(mesh.cell_size.min()))
     n = int(number.max(initial=-1)) + 1
     one = np.zeros(n, dtype=np.int64)
     one[number] = np.arange(len(number))
     triangles = number.reshape(-1, 3)
-    triangles = np.where(over[:, None], triangles[:, [0, 2, 1]], triangles)
+    triangles = np.where(is_reversed[:, None], triangles[:, [0, 2, 1]], triangles)
     owner, vertex = one // 3, one % 3
-    moved = []
+    moved_points = []
     for k in (0, 1):
         cell, bary = cut.lip_cell[owner, k], cut.lip_bary[owner, k, vertex]
         with np.errstate(divide="ignore", invalid="ignore"):  # gradients at a front, not looked at
             side = lip_side(space, crack, cell, bary, 2 * k - 1)
-            moved.append(solution.at(cell, bary, side)[0])
+            moved_points.append(solution.at(cell, bary, side)[0])
 
     weight = np.maximum(np.bincount(lips.segment, lips.weight, len(area)), 1e-300)
 
@@ -115,16 +115,16 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     nothing = np.zeros(len(lips))
     pressure = nothing if contact is None else contact.pressure
     share = np.repeat(area, 3)
-    around = np.maximum(np.bincount(number, share, n), 1e-300)
+    area_around = np.maximum(np.bincount(number, share, n), 1e-300)
     normal = np.stack(
         [np.bincount(number, share * np.repeat(v, 3), n) for v in cut.lip_normal.T], axis=1
     )
     at_corner = _at_corners(solution, crack, pressure)
     edges, row = rim(triangles)
     on_front = _on_front(solution, crack, one)
-    ahead = on_front[edges].all(axis=1) & (area[row] > 0)
-    ends = _on_other(solution, crack, one)[edges].all(axis=1) & ~ahead
-    leaves = ~ahead & ~ends
+    is_front_edge = on_front[edges].all(axis=1) & (area[row] > 0)
+    ends = _on_other(solution, crack, one)[edges].all(axis=1) & ~is_front_edge
+    leaves = ~is_front_edge & ~ends
     if any(crack in (joint.crack, joint.on) for joint in space.joints):
         # Faces that an arm splits lie beside whole ones: such edges are no mouth.
         middle = corners.reshape(-1, 3)[one][edges].mean(axis=1)
@@ -134,14 +134,14 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
         points=lock(corners.reshape(-1, 3)[one]),
         triangles=lock(triangles),
         normal=lock(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)),
-        pressure=lock(np.bincount(number, share * at_corner.ravel(), n) / around),
-        minus=lock(moved[0]),
-        plus=lock(moved[1]),
+        pressure=lock(np.bincount(number, share * at_corner.ravel(), n) / area_around),
+        minus=lock(moved_points[0]),
+        plus=lock(moved_points[1]),
         area=lock(area),
         mean_pressure=mean(pressure),
         mean_gap=mean(solution.opening(crack) if contact is None else contact.gap),
         closed=mean(nothing if contact is None else contact.closed.astype(float)),
-        front=lock(edges[ahead]),
+        front=lock(edges[is_front_edge]),
         junction=lock(edges[ends]),
         mouth=lock(edges[leaves]),
     )
@@ -190,23 +190,23 @@ def _at_corners(solution: Solution, crack: int, values: Floats) -> Floats:
     corners = cut.lip_points(solution.space.mesh)
     place = _in_triangles(corners[lips.segment], lips.x)
     t = len(corners)
-    mass, right = np.zeros((t, 3, 3)), np.zeros((t, 3))
+    mass, rhs = np.zeros((t, 3, 3)), np.zeros((t, 3))
     weight = lips.weight / np.maximum(
         np.bincount(lips.segment, lips.weight, t)[lips.segment], 1e-300
     )
     np.add.at(mass, lips.segment, weight[:, None, None] * place[:, :, None] * place[:, None])
-    np.add.at(right, lips.segment, (weight * values)[:, None] * place)
+    np.add.at(rhs, lips.segment, (weight * values)[:, None] * place)
     # A rule with few points, or a triangle that is nearly a line, would leave the fit open.
-    mean = right.sum(axis=1) / np.maximum(mass.sum(axis=(1, 2)), 1e-300)
-    small = 1e-9 * np.eye(3)
-    fit = np.linalg.solve(mass + small, (right + 1e-9 * mean[:, None])[..., None])[..., 0]
+    mean = rhs.sum(axis=1) / np.maximum(mass.sum(axis=(1, 2)), 1e-300)
+    regularisation = 1e-9 * np.eye(3)
+    fit = np.linalg.solve(mass + regularisation, (rhs + 1e-9 * mean[:, None])[..., None])[..., 0]
     low = np.full(t, np.inf)
     high = np.full(t, -np.inf)
     np.minimum.at(low, lips.segment, values)
     np.maximum.at(high, lips.segment, values)
     reach = (high - low)[:, None]
-    inside = np.clip(fit, low[:, None] - reach, high[:, None] + reach)
-    return np.where(np.isfinite(inside), inside, mean[:, None])
+    bounded = np.clip(fit, low[:, None] - reach, high[:, None] + reach)
+    return np.where(np.isfinite(bounded), bounded, mean[:, None])
 
 
 def _in_triangles(corners: Floats, x: Floats) -> Floats:
@@ -216,8 +216,8 @@ def _in_triangles(corners: Floats, x: Floats) -> Floats:
     square = np.maximum(np.einsum("qd,qd->q", normal, normal), 1e-300)
     y = x - corners[:, 0]
     second = np.einsum("qd,qd->q", np.cross(y, b), normal) / square
-    third = np.einsum("qd,qd->q", np.cross(a, y), normal) / square
-    return np.stack([1 - second - third, second, third], axis=1)
+    third_weight = np.einsum("qd,qd->q", np.cross(a, y), normal) / square
+    return np.stack([1 - second - third_weight, second, third_weight], axis=1)
 
 
 def _on_front(solution: Solution, crack: int, one: Ints) -> Bools:

@@ -50,27 +50,27 @@ def crack_opening(
     c = crack_number(solution.problem, crack, "crack_opening")
     d = solution.space.dim
     if x is None:
-        points, single = _mouths(solution, c), False
+        points, is_single = _mouths(solution, c), False
     else:
-        given = np.asarray(x)
-        single, points = given.ndim == 1, np.atleast_2d(given)
+        places = np.asarray(x)
+        is_single, points = places.ndim == 1, np.atleast_2d(places)
         if points.ndim != 2 or points.shape[1] != d:
             raise ProblemError(
-                f"crack_opening: x has the shape {given.shape}: give points (n, {d}), or one point."
+                f"crack_opening: x has the shape {places.shape}: give points (n, {d}) or one."
             )
     lips = solution.lips[c]
     distance, nearest = cKDTree(lips.x).query(points)
     normal = lips.normal[nearest]
     normal_distance = np.abs(np.einsum("qd,qd->q", points - lips.x[nearest], normal))
     if (normal_distance > 0.5 * distance + _NEAR * solution.problem.mesh.extent).any():
-        farthest = points[int(np.argmax(normal_distance))]
+        farthest_point = points[int(np.argmax(normal_distance))]
         raise ProblemError(
-            f"crack_opening: {np.round(farthest, 9).tolist()} does not lie on crack {c}: give "
-            f"points on it, or leave x out for its mouths."
+            f"crack_opening: {np.round(farthest_point, 9).tolist()} does not lie on crack {c}: "
+            f"give points on it, or leave x out for its mouths."
         )
     jump = solution.displacement(points, side=1) - solution.displacement(points, side=-1)
     opening = np.einsum("qd,qd->q", jump, normal)
-    return opening[0] if single else opening
+    return opening[0] if is_single else opening
 
 
 def _mouths(solution: Solution, c: int) -> Floats:
@@ -160,11 +160,13 @@ def energy_error(
         points = cell_points(space, cells, 8, 2 * space.order + 2)
         x = position(space, points.cell, points.bary)
         result = call_function(stress, "the exact stress of energy_error", x)
-        exact = numbers(result, "energy_error: the stress at points (n, d)", (*x.shape, x.shape[1]))
-        difference = exact - solution.stress_at(points.cell, points.bary, points.side)
+        exact_stress = numbers(
+            result, "energy_error: the stress at points (n, d)", (*x.shape, x.shape[1])
+        )
+        difference = exact_stress - solution.stress_at(points.cell, points.bary, points.side)
         where = points.cell, points.bary
         error += _energy(elasticity.strain(difference, *where), difference, points.weight)
-        total += _energy(elasticity.strain(exact, *where), exact, points.weight)
+        total += _energy(elasticity.strain(exact_stress, *where), exact_stress, points.weight)
     if not total > 0:
         raise ProblemError(
             "energy_error: the exact stress is zero everywhere, so there is no relative error."

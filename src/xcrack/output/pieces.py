@@ -66,23 +66,23 @@ def piece_cells(space: FunctionSpace) -> PieceCells:
     neighbours may halve a four-sided face along different diagonals: points on such a face hang.
     They lie where they should and carry the value of the solution there, which a picture needs.
     """
-    touched = space.signature > 0
+    is_touched = space.signature > 0
     for cut in space.cuts:
-        touched = touched | cut.is_cut | cut.is_tip
+        is_touched = is_touched | cut.is_cut | cut.is_tip
     mesh, plane = space.mesh, space.dim == 2
     if plane:
         is_near = _near_tip(space, mesh.points[mesh.edges])
-        touched = touched | is_near[mesh.cell_to_edge].any(axis=1)
-    plain, others = np.nonzero(~touched)[0], np.nonzero(touched)[0]
+        is_touched = is_touched | is_near[mesh.cell_to_edge].any(axis=1)
+    plain_cells, others = np.nonzero(~is_touched)[0], np.nonzero(is_touched)[0]
     subs = sub_cells(space, others)
     cell, bary, side = (
         _without_exits(space, subs) if plane else (subs.cell, subs.bary.copy(), subs.side.copy())
     )
-    wrong = np.linalg.det(bary) < 0
-    bary[wrong, -2:] = bary[wrong, -2:][:, ::-1]
+    is_reversed = np.linalg.det(bary) < 0
+    bary[is_reversed, -2:] = bary[is_reversed, -2:][:, ::-1]
     for _ in range(_LEVELS if plane else 0):
         cell, bary, side = _halve_edges(space, cell, bary, side)
-    return PieceCells(plain, cell, bary, side)
+    return PieceCells(plain_cells, cell, bary, side)
 
 
 def _near_tip(space: FunctionSpace, ends: Floats) -> Bools:
@@ -102,8 +102,8 @@ def _halve_edges(
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
     mark = _near_tip(space, x[:, pairs])
     nodes = np.concatenate([bary, bary[:, pairs].mean(axis=2)], axis=1)
-    unmarked = np.nonzero(~mark.any(axis=1))[0]
-    rows, parts = [unmarked], [bary[unmarked]]
+    unmarked_rows = np.nonzero(~mark.any(axis=1))[0]
+    rows, parts = [unmarked_rows], [bary[unmarked_rows]]
     for pattern, triangles in _PARTS.items():
         rows_of_pattern = np.nonzero((mark == pattern).all(axis=1))[0]
         for triangle in triangles:
@@ -125,16 +125,18 @@ def _without_exits(space: FunctionSpace, subs: SubCells) -> tuple[Ints, Floats, 
         if not cut.n_tips:
             continue
         phi = np.einsum("svb,sb->sv", bary, cut.level_set.phi[corner])
-        inside = np.einsum("svb,sb->sv", bary, cut.level_set.inside[corner])
-        small = 1e-9 * space.mesh.cell_size[subs.cell][:, None]
-        exits = (np.abs(phi) <= small) & (inside > 0) & (bary.max(axis=2) < 1 - 1e-12)
+        psi = np.einsum("svb,sb->sv", bary, cut.level_set.inside[corner])
+        tolerance = 1e-9 * space.mesh.cell_size[subs.cell][:, None]
+        exits = (np.abs(phi) <= tolerance) & (psi > 0) & (bary.max(axis=2) < 1 - 1e-12)
         exits &= (subs.fan & cut.is_tip[subs.cell])[:, None]
-        before, after = np.nonzero(exits[:, 2])[0], np.nonzero(exits[:, 1])[0]
-        _, i, j = np.intersect1d(subs.cell[before], subs.cell[after], return_indices=True)
-        before, after = before[i], after[j]
-        bary[before, 2] = bary[after, 2]
-        side[before, c] = 0
-        keep[after] = False
+        previous_rows, next_rows = np.nonzero(exits[:, 2])[0], np.nonzero(exits[:, 1])[0]
+        _, i, j = np.intersect1d(
+            subs.cell[previous_rows], subs.cell[next_rows], return_indices=True
+        )
+        previous_rows, next_rows = previous_rows[i], next_rows[j]
+        bary[previous_rows, 2] = bary[next_rows, 2]
+        side[previous_rows, c] = 0
+        keep[next_rows] = False
     return subs.cell[keep], bary[keep], side[keep]
 
 
@@ -220,24 +222,27 @@ def pieces(solution: Solution) -> Pieces:
     space = solution.space
     mesh, d = space.mesh, space.dim
     cells = piece_cells(space)
-    plain = cells.plain_cells
-    whole_pieces = np.broadcast_to(np.eye(d + 1), (len(plain), d + 1, d + 1))
+    plain_cells = cells.plain_cells
+    whole_pieces = np.broadcast_to(np.eye(d + 1), (len(plain_cells), d + 1, d + 1))
     blocks = [
-        _Block.of(space, plain, whole_pieces, space.order),
+        _Block.of(space, plain_cells, whole_pieces, space.order),
         _Block.of(space, cells.cell, cells.bary, 2, cells.side),
     ]
-    nodes = space.cell_nodes[plain]
-    used, first, number = np.unique(nodes, return_index=True, return_inverse=True)
+    nodes = space.cell_nodes[plain_cells]
+    nodes_in_use, first, number = np.unique(nodes, return_index=True, return_inverse=True)
     number = number.reshape(nodes.shape)
-    shared = np.isin(used, space.cell_nodes[np.unique(cells.cell)])
-    joined, n, source = _join(space, blocks, used, first, shared)
-    point = [number.ravel(), joined]
+    is_shared = np.isin(nodes_in_use, space.cell_nodes[np.unique(cells.cell)])
+    joined_numbers, n, source = _join(space, blocks, nodes_in_use, first, is_shared)
+    point = [number.ravel(), joined_numbers]
 
     x = np.empty((n, d))
     u = np.empty((n, d))
     with np.errstate(divide="ignore", invalid="ignore"):  # the gradient at a tip, not looked at
-        x[joined], u[joined] = blocks[1].x, solution.at(*blocks[1].places)[0]
-    x[: len(used)], u[: len(used)] = space.node_points[used], solution.coefficients[used]
+        x[joined_numbers], u[joined_numbers] = blocks[1].x, solution.at(*blocks[1].places)[0]
+    x[: len(nodes_in_use)], u[: len(nodes_in_use)] = (
+        space.node_points[nodes_in_use],
+        solution.coefficients[nodes_in_use],
+    )
     stress, center = zip(*[_stresses(solution, block) for block in blocks], strict=True)
     weight = np.concatenate([block.weight for block in blocks])
     every, origin = np.concatenate(point), np.arange(n)
@@ -246,7 +251,7 @@ def pieces(solution: Solution) -> Pieces:
         owner = np.concatenate([block.places[0] for block in blocks])
         every, origin = _apart_by_material(every, set_number[owner], n)
         n, x, u, source = len(origin), x[origin], u[origin], source[origin]
-        number, joined = every[: number.size].reshape(number.shape), every[number.size :]
+        number, joined_numbers = every[: number.size].reshape(number.shape), every[number.size :]
     total = np.bincount(every, weight, n)
     values = np.concatenate(stress).reshape(-1, 9)
     mean = np.stack([np.bincount(every, weight * v, n) / total for v in values.T], axis=1)
@@ -260,9 +265,9 @@ def pieces(solution: Solution) -> Pieces:
         displacement=lock(u),
         stress=lock(mean.reshape(-1, 3, 3)),
         plain=lock(number),
-        split=lock(joined.reshape(-1, n_shapes(2, d))),
-        cell=lock(np.concatenate([plain, cells.cell])),
-        side=lock(np.concatenate([cell_side(space, plain), cells.side])),
+        split=lock(joined_numbers.reshape(-1, n_shapes(2, d))),
+        cell=lock(np.concatenate([plain_cells, cells.cell])),
+        side=lock(np.concatenate([cell_side(space, plain_cells), cells.side])),
         center_stress=lock(np.concatenate(center)),
         phi=lock(
             np.array([c.level(mesh, cell[source], bary[source]) for c in space.cuts]).reshape(-1, n)
@@ -274,12 +279,12 @@ def pieces(solution: Solution) -> Pieces:
 def _apart_by_material(point: Ints, material: Ints, n: int) -> tuple[Ints, Ints]:
     """Points of nodes `(q,)` of which each has one material, and the point each was `(m,)`."""
     key, number = np.unique(point * (material.max() + 1) + material, return_inverse=True)
-    old = key // (material.max() + 1)
-    first = np.append(True, old[1:] != old[:-1])  # it keeps its number
-    new = np.where(first, old, n - 1 + np.cumsum(~first))
+    old_point = key // (material.max() + 1)
+    first = np.append(True, old_point[1:] != old_point[:-1])  # it keeps its number
+    new_number = np.where(first, old_point, n - 1 + np.cumsum(~first))
     origin = np.empty(n + int((~first).sum()), dtype=np.int64)
-    origin[new] = old
-    return new[number], origin
+    origin[new_number] = old_point
+    return new_number[number], origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,12 +306,12 @@ class _Block:
             middle = corners[:, local_edges(space.dim)].mean(axis=2)
             bary = np.concatenate([corners, middle], axis=1)
         k = bary.shape[1]
-        flat = bary.reshape(-1, space.dim + 1)
+        bary_rows = bary.reshape(-1, space.dim + 1)
         owner = np.repeat(cell, k)
         volume = np.abs(np.linalg.det(corners)) * space.mesh.volume[cell]
         return cls(
-            (owner, flat, np.repeat(side, k, axis=0)),
-            position(space, owner, flat),
+            (owner, bary_rows, np.repeat(side, k, axis=0)),
+            position(space, owner, bary_rows),
             # A piece too thin for its volume to be distinguished from zero still has a weight.
             np.repeat(np.maximum(volume, 1e-30 * space.mesh.volume[cell]), k),
             (cell, corners.mean(axis=1), side),
@@ -314,29 +319,30 @@ class _Block:
 
 
 def _join(
-    space: FunctionSpace, blocks: list[_Block], used: Ints, first: Ints, shared: Bools
+    space: FunctionSpace, blocks: list[_Block], nodes_in_use: Ints, first: Ints, is_shared: Bools
 ) -> tuple[Ints, int, Ints]:
     """Points of the split pieces `(q,)`: one for each place and lip; plain nodes come first.
 
     Also the number of points, and for each a row of the two blocks in which it occurs.
     """
-    plain, split = blocks
-    n_plain, n_rows = len(used), len(plain.weight)
-    old = np.nonzero(shared)[0]
+    plain_block, split = blocks
+    n_plain, n_rows = len(nodes_in_use), len(plain_block.weight)
+    shared_rows = np.nonzero(is_shared)[0]
     cell, bary, side = (
-        np.concatenate([a[first[old]], b]) for a, b in zip(plain.places, split.places, strict=True)
+        np.concatenate([a[first[shared_rows]], b])
+        for a, b in zip(plain_block.places, split.places, strict=True)
     )
-    x = np.concatenate([plain.x[first[old]], split.x])
+    x = np.concatenate([plain_block.x[first[shared_rows]], split.x])
     size = float(space.mesh.cell_size.min())
     key = np.concatenate([(x - x[:1]) / size, 3.0 * _lip(space, cell, bary, side)], axis=1)
     group = _place_numbers(key)
     point = np.full(group.max(initial=-1) + 1, -1, dtype=np.int64)
-    point[group[: len(old)]] = old
-    new = np.nonzero(point < 0)[0]
-    point[new] = n_plain + np.arange(len(new))
+    point[group[: len(shared_rows)]] = shared_rows
+    new_points = np.nonzero(point < 0)[0]
+    point[new_points] = n_plain + np.arange(len(new_points))
     _, one = np.unique(group, return_index=True)
-    source = np.concatenate([first, n_rows + one[new] - len(old)])
-    return point[group[len(old) :]], n_plain + len(new), source
+    source = np.concatenate([first, n_rows + one[new_points] - len(shared_rows)])
+    return point[group[len(shared_rows) :]], n_plain + len(new_points), source
 
 
 def _place_numbers(key: Floats) -> Ints:
@@ -344,14 +350,14 @@ def _place_numbers(key: Floats) -> Ints:
 
     Most rows are equal when rounded; only one of these is compared with others.
     """
-    _, one, rounded = np.unique(
+    _, one, group_of_place = np.unique(
         np.round(key / _SAME).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
     pairs = cKDTree(key[one]).query_pairs(_SAME, output_type="ndarray")
     n = len(one)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, group = connected_components(links, directed=False)
-    return np.asarray(group[rounded.ravel()], dtype=np.int64)
+    return np.asarray(group[group_of_place.ravel()], dtype=np.int64)
 
 
 def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
@@ -362,8 +368,8 @@ def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
     for c, cut in enumerate(space.cuts):
         phi = cut.level(space.mesh, cell, bary)
         # A crack without tips lies behind them everywhere.
-        inside = (bary * np.maximum(cut.level_set.inside, -1e300)[corner]).sum(axis=1)
-        lip[:, c] = np.where((np.abs(phi) <= tolerance) & (inside < -tolerance), side[:, c], 0)
+        psi = (bary * np.maximum(cut.level_set.inside, -1e300)[corner]).sum(axis=1)
+        lip[:, c] = np.where((np.abs(phi) <= tolerance) & (psi < -tolerance), side[:, c], 0)
     return lip
 
 
@@ -399,8 +405,8 @@ def full_stress(solution: Solution, cell: Ints, bary: Floats, side: Ints) -> Flo
     stress = np.zeros((len(cell), 3, 3))
     stress[:, :d, :d] = solution.stress_at(cell, bary, side)
     if d == 2:
-        elastic = stress[:, :d, :d] - initial_stress_at(solution, cell, bary)
-        stress[:, 2, 2] = solution.problem.elasticity.stress_across(elastic, cell, bary)
+        elastic_stress = stress[:, :d, :d] - initial_stress_at(solution, cell, bary)
+        stress[:, 2, 2] = solution.problem.elasticity.stress_across(elastic_stress, cell, bary)
     return stress
 
 
@@ -444,7 +450,7 @@ class Lips:
 def lips_of(solution: Solution, crack: int) -> Lips:
     """Fields on the faces of a crack."""
     lips, contact = solution.lips[crack], solution.contact[crack]
-    moved = [
+    tangents = [
         solution.at(cell, bary, lip_side(solution.space, crack, cell, bary, sign))
         for cell, bary, sign in zip(lips.cell.T, lips.bary.transpose(1, 0, 2), (-1, 1))
     ]
@@ -462,8 +468,8 @@ def lips_of(solution: Solution, crack: int) -> Lips:
         opening if contact is None else contact.gap,
         np.zeros(len(lips), dtype=bool) if contact is None else contact.closed,
         solution.jump(crack),
-        moved[0][0],
-        moved[1][0],
+        tangents[0][0],
+        tangents[1][0],
         tuple(run for run in runs if len(run)),
     )
 

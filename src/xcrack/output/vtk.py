@@ -183,12 +183,12 @@ def _write_lips(solution: Solution, path: Path) -> None:
         "weight": [each.weight for each in solution.lips],
     }
     if any(solution.problem.frictions):
-        shears = [(lip_shear(solution, c), len(each.s)) for c, each in enumerate(lips)]
-        vectors["shear"] = [np.zeros((n, 2)) if t is None else t for t, n in shears]
-        stuck = [None if c is None else c.stuck for c in solution.contact]
+        shear_of_lips = [(lip_shear(solution, c), len(each.s)) for c, each in enumerate(lips)]
+        vectors["shear"] = [np.zeros((n, 2)) if t is None else t for t, n in shear_of_lips]
+        stuck_flags = [None if c is None else c.stuck for c in solution.contact]
         scalars["stuck"] = [
             np.zeros(len(each.s), np.int8) if stuck_points is None else stuck_points.astype(np.int8)
-            for stuck_points, each in zip(stuck, lips, strict=True)
+            for stuck_points, each in zip(stuck_flags, lips, strict=True)
         ]
     d = solution.space.dim
     at_points = {name: np.concatenate(values) for name, values in scalars.items()}

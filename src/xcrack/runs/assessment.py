@@ -82,11 +82,11 @@ class assessment_line(Declared):  # noqa: N801 - it is used as a function
         def is_below(L: Floats) -> Floats:
             return np.asarray((0.3 + 0.7 * np.exp(-mu * L**6)) / np.sqrt(1 + L**2 / 2))
 
-        beyond = 0.0
+        above_1 = 0.0
         if N > 0:
-            beyond = is_below(np.ones(1))[0] * np.maximum(L, 1.0) ** ((N - 1) / (2 * N))
-        inside = np.where(L <= 1, is_below(np.minimum(L, 1.0)), beyond)
-        return np.asarray(np.where(L < self.L_max, inside, 0.0))[()]
+            above_1 = is_below(np.ones(1))[0] * np.maximum(L, 1.0) ** ((N - 1) / (2 * N))
+        allowed_K = np.where(L <= 1, is_below(np.minimum(L, 1.0)), above_1)
+        return np.asarray(np.where(L < self.L_max, allowed_K, 0.0))[()]
 
     def reserve(self, K_r: float, L_r: float) -> float:
         """Factor on the load at which the point (K_r, L_r) comes to the line.
@@ -102,18 +102,20 @@ class assessment_line(Declared):  # noqa: N801 - it is used as a function
             raise ProblemError("assessment_line.reserve: K_r and L_r are 0: give a load.")
         if L == 0:
             return 1.0 / K
-        most = self.L_max / L
+        largest_factor = self.L_max / L
         if K == 0:
-            return most
+            return largest_factor
 
         def cycles_left(factor: float) -> float:
             return (
                 float(self(np.asarray(min(factor * L, np.nextafter(self.L_max, 0))))) - factor * K
             )
 
-        if cycles_left(most) > 0:
-            return most
-        return float(brentq(cycles_left, 0.0, most, xtol=1e-14 * most, rtol=1e-14))
+        if cycles_left(largest_factor) > 0:
+            return largest_factor
+        return float(
+            brentq(cycles_left, 0.0, largest_factor, xtol=1e-14 * largest_factor, rtol=1e-14)
+        )
 
 
 @check_arguments()
@@ -222,8 +224,8 @@ def residual_strength(
             )
         if line is not None:
             row["by_line"] = line.reserve(1 / by_K, 1 / row["by_collapse"])
-        counted = [name for name in CRITERIA if resistance is None or name != "by_toughness"]
-        row["factor"] = np.nanmin([row[name] for name in counted])
+        criteria = [name for name in CRITERIA if resistance is None or name != "by_toughness"]
+        row["factor"] = np.nanmin([row[name] for name in criteria])
     return result
 
 
@@ -255,8 +257,8 @@ def _by_resistance(
     K: list[float] = []
     c = crack
     for step, name in zip(steps, names, strict=True):
-        met = a and any(c in join.cracks for join in step.joins)
-        if met or names[0][crack] not in name or not step.sizes:
+        has_met = a and any(c in join.cracks for join in step.joins)
+        if has_met or names[0][crack] not in name or not step.sizes:
             break
         c = name.index(names[0][crack])
         tips = max(len(step.angle[c]), 1) if step.cracks[c].dim == 2 else 1
@@ -264,8 +266,8 @@ def _by_resistance(
         K.append(K_of_cracks(step, nu)[c])
     if not a or not all(np.isfinite(a)):
         return np.nan
-    rising = np.concatenate([[True], a[1:] > np.maximum.accumulate(a)[:-1]])
-    length, size = np.array(a)[rising], np.array(K)[rising]
+    is_rising = np.concatenate([[True], a[1:] > np.maximum.accumulate(a)[:-1]])
+    length, size = np.array(a)[is_rising], np.array(K)[is_rising]
     # Between two steps K is straight in a; the curve has its own shape.
     places = np.unique(
         np.concatenate(
@@ -296,8 +298,8 @@ def _by_section(step: Step, yield_stress: float) -> float:
         return np.nan
     problem = step.solutions[0].problem
     material = problem.elasticity.material.with_yield_stress(yield_stress)
-    known = validity(material, problem.mesh, step.cracks, step.sif, step.solutions)
-    return np.nan if known is None or not known.of_section > 0 else 1 / known.of_section
+    check = validity(material, problem.mesh, step.cracks, step.sif, step.solutions)
+    return np.nan if check is None or not check.of_section > 0 else 1 / check.of_section
 
 
 def _by_link_up(step: Step, nu: float, yield_stress: float) -> float:
@@ -309,15 +311,15 @@ def _by_link_up(step: Step, nu: float, yield_stress: float) -> float:
     ]
     if not tips or len(tips[0][1]) != 2:
         return np.nan
-    least = np.inf
-    for (c, x, ahead, K), (d, y, other, L) in combinations(tips, 2):
+    factor = np.inf
+    for (c, x, direction, K), (d, y, other, L) in combinations(tips, 2):
         way = y - x
         ligament = float(np.linalg.norm(way))
-        faces = min(way @ ahead, -(way @ other)) > _FACING * ligament
+        faces = min(way @ direction, -(way @ other)) > _FACING * ligament
         if c != d and faces and K**2 + L**2 > 0:
             zones = (K**2 + L**2) / (2 * np.pi * yield_stress**2)
-            least = min(least, float(np.sqrt(ligament / zones)))
-    return least
+            factor = min(factor, float(np.sqrt(ligament / zones)))
+    return factor
 
 
 def geometry_factors(history: History, *, stress: float) -> NDArray[Any]:
@@ -412,14 +414,14 @@ def write_factors(
         a, half = _on_surface(history, rows_of_tip["step"], c)
     beta = rows_of_tip["K_I"] / (stress * np.sqrt(np.pi * a))
     table = np.stack([a, half, rows_of_tip["K_I"], beta], axis=1)
-    rising = np.concatenate([[True], a[1:] > np.maximum.accumulate(a)[:-1]])
+    is_rising = np.concatenate([[True], a[1:] > np.maximum.accumulate(a)[:-1]])
     path = path_of(file, "write_factors: file", error=ProblemError)
     head = (
         f"# K over the length of crack {c}, tip {j}, by xcrack; units of the run\n"
         f"# reference stress {stress:.12g}; beta = K / (stress sqrt(pi a))\n"
         f"# {' '.join(f'{name:>15}' for name in _COLUMNS)}\n"
     )
-    lines = (" ".join(f"{value:15.8g}" for value in row) for row in table[rising].tolist())
+    lines = (" ".join(f"{value:15.8g}" for value in row) for row in table[is_rising].tolist())
     with system_errors("a folder cannot be made for", path, error=ProblemError):
         path.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(path, "the table cannot be written to", error=ProblemError) as part:

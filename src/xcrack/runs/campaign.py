@@ -57,19 +57,19 @@ def checked_case(parameters: Any, number: int) -> dict[str, Any]:
             "of a case."
         )
     result: dict[str, Any] = {}
-    for name, given in parameters.items():
-        value = given.item() if isinstance(given, np.generic) else given
+    for name, parameter in parameters.items():
+        value = parameter.item() if isinstance(parameter, np.generic) else parameter
         if name in COLUMNS:
             raise ProblemError(
                 f"campaign: cases[{number}] has a parameter {name!r}, which is a column of the "
                 "table: give it another name."
             )
-        fits = value is None or isinstance(value, bool | str)
-        fits = fits or (isinstance(value, int | float) and bool(np.isfinite(value)))
-        if not isinstance(name, str) or not fits:
+        is_valid = value is None or isinstance(value, bool | str)
+        is_valid = is_valid or (isinstance(value, int | float) and bool(np.isfinite(value)))
+        if not isinstance(name, str) or not is_valid:
             raise ProblemError(
-                f"campaign: cases[{number}][{name!r:.40}] = {value_text(given)}: give names, and "
-                f"finite numbers, texts, True, False or None; make meshes and laws within the case."
+                f"campaign: cases[{number}][{name!r:.40}] = {value_text(parameter)}: give names, "
+                "and finite numbers, texts, True, False or None; make meshes and laws in the case."
             )
         result[name] = value
     return result
@@ -108,12 +108,14 @@ def _numbers(value: Any, parameters: Parameters) -> dict[str, Any]:
         value = {"life": value.life, "steps": last + 1, "ended": value.ended}
     if isinstance(value, Mapping):
         result = {}
-        for name, given in value.items():
-            number = given.item() if isinstance(given, np.generic) else given
+        for name, value_of_name in value.items():
+            number = (
+                value_of_name.item() if isinstance(value_of_name, np.generic) else value_of_name
+            )
             if not isinstance(number, Real | str) or isinstance(number, complex):
                 raise ProblemError(
-                    f"campaign: a case returned {name!r:.40} = {value_text(given)}: give numbers "
-                    "and texts."
+                    f"campaign: a case returned {name!r:.40} = {value_text(value_of_name)}: give "
+                    "numbers and texts."
                 )
             if name in COLUMNS or (name in parameters and number != parameters[name]):
                 raise ProblemError(
@@ -242,25 +244,27 @@ def finished_names(engine: Engine, futures: Mapping[str, Any]) -> Iterator[str]:
     ProblemError
         The client is closed before all have finished.
     """
-    done: queue.SimpleQueue[str] = queue.SimpleQueue()
-    tells = [callable(getattr(future, "add_done_callback", None)) for future in futures.values()]
-    if not tells or not all(tells):
+    finished_queue: queue.SimpleQueue[str] = queue.SimpleQueue()
+    has_callback = [
+        callable(getattr(future, "add_done_callback", None)) for future in futures.values()
+    ]
+    if not has_callback or not all(has_callback):
         yield from futures
         return
     for key, future in futures.items():
-        future.add_done_callback(lambda _, key=key: done.put(key))
-    waiting = set(futures)
-    while waiting:
+        future.add_done_callback(lambda _, key=key: finished_queue.put(key))
+    open_futures = set(futures)
+    while open_futures:
         try:
-            key = done.get(timeout=_LOOK)
+            key = finished_queue.get(timeout=_LOOK)
         except queue.Empty:
             if engine.is_closed:
                 raise ProblemError(
-                    f"campaign: the client is closed, and {len(waiting)} cases are not finished. "
-                    "Finished cases are stored: call again with another client to go on."
+                    f"campaign: the client is closed, and {len(open_futures)} cases are not "
+                    "finished. Finished cases are stored: call again with another client to go on."
                 ) from None
             continue
-        waiting.discard(key)
+        open_futures.discard(key)
         yield key
 
 
@@ -437,23 +441,25 @@ def campaign(
         raise ProblemError(
             f"campaign: case = {value_text(case)} cannot be called: give a function."
         )
-    again = flag(retry, "campaign: retry")
-    listed = _list_of(cases, "campaign: cases", "a list of dicts")
+    is_retry = flag(retry, "campaign: retry")
+    case_list = _list_of(cases, "campaign: cases", "a list of dicts")
     count = whole_number(workers, "campaign: workers", least=1, most=1024)
     if client is not None and not callable(getattr(client, "submit", None)):
         raise ProblemError(
             f"campaign: client = {value_text(client)}: give one that has submit(...)."
         )
-    every = {key_of(each): each for each in (checked_case(c, n) for n, c in enumerate(listed))}
+    every = {key_of(each): each for each in (checked_case(c, n) for n, c in enumerate(case_list))}
     if not every:
         raise ProblemError("campaign: cases is empty: give one, at least.")
     with system_errors("the study cannot be written to", folder, error=ProblemError):
         folder.mkdir(parents=True, exist_ok=True)
     with lock_folder(folder):
         _check_header(folder, case)
-        stored = {key: _read(folder, key) for key in every}
+        stored_rows = {key: _read(folder, key) for key in every}
         result_names = [
-            key for key, row in stored.items() if row is None or (again and bool(row["kind"]))
+            key
+            for key, row in stored_rows.items()
+            if row is None or (is_retry and bool(row["kind"]))
         ]
         _run_through_deaths(folder, case, every, result_names, count, client)
     study = Study(folder, tuple(_stored_case(folder, key) for key in every))
@@ -521,15 +527,15 @@ def _run_through_deaths(
     """
     remaining_names = list(names)
     while remaining_names:
-        finished: set[str] = set()
+        finished_keys: set[str] = set()
         try:
             with engine_of(workers, client) as engine:
-                _run(folder, case, every, remaining_names, engine, finished)
+                _run(folder, case, every, remaining_names, engine, finished_keys)
             return
         except WorkerDeathError:
             if client is not None:
                 raise
-        remaining_names = [key for key in remaining_names if key not in finished]
+        remaining_names = [key for key in remaining_names if key not in finished_keys]
         suspects = remaining_names[: 2 * workers + 1]  # under way, and handed out
         for key in suspects:
             _run_alone(folder, case, key, every[key])
@@ -562,21 +568,21 @@ def _run(
     every: Mapping[str, dict[str, Any]],
     names: list[str],
     engine: Engine,
-    finished: set[str],
+    finished_keys: set[str],
 ) -> None:
     """Run the cases; each is stored as soon as it is finished, in whatever order."""
     first, remaining_names = names[0], names[1:]
     _finish(engine, folder, first, every[first], submit_case(engine, every[first], case))
-    finished.add(first)
+    finished_keys.add(first)
     futures: dict[str, Any] = {}
     try:
         for key in remaining_names:
             futures[key] = submit_case(engine, every[key], case)
         for key in finished_names(engine, futures):
             _finish(engine, folder, key, every[key], futures[key])
-            finished.add(key)
+            finished_keys.add(key)
     except BaseException:
-        _store_finished(folder, every, engine, futures, finished)
+        _store_finished(folder, every, engine, futures, finished_keys)
         raise
 
 
@@ -585,15 +591,15 @@ def _store_finished(
     every: Mapping[str, dict[str, Any]],
     engine: Engine,
     futures: Mapping[str, Any],
-    finished: set[str],
+    finished_keys: set[str],
 ) -> None:
     """Store what has been finished when a study is broken off, and call off the rest."""
     if engine.is_closed:  # it would wait for an answer that never comes
         return
     for key, future in futures.items():
-        if is_good(future) and key not in finished:
+        if is_good(future) and key not in finished_keys:
             _finish(engine, folder, key, every[key], future)
-            finished.add(key)
+            finished_keys.add(key)
         call_off(future)
 
 
@@ -612,33 +618,33 @@ def _store(folder: Path, key: str, row: Mapping[str, Any]) -> None:
 
 def _check_header(folder: Path, case: Callable[..., Any]) -> None:
     """Write what the case is, or refuse a folder of another one."""
-    given, header = describe("case", case), folder / _HEADER
+    lines, header = describe("case", case), folder / _HEADER
     if header.exists():
         with system_errors("the study cannot be read from", header, error=ProblemError):
             data = header.read_bytes()
         try:
-            stored = json.loads(data)["case"]
+            stored_lines = json.loads(data)["case"]
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise ProblemError(f"{header} is no header of a study: take another folder.") from error
-        changed = differences(stored, given)
+        changes = differences(stored_lines, lines)
         rows = list(folder.glob("row_*.json"))
-        if changed and not any(_is_good_row(file) for file in rows):
+        if changes and not any(_is_good_row(file) for file in rows):
             with system_errors("the study cannot be written to", folder, error=ProblemError):
                 for file in rows:  # failures of another function
                     file.unlink()
-            _write_header(header, given)
-        elif changed:
+            _write_header(header, lines)
+        elif changes:
             raise ProblemError(
                 f"{folder} holds a study of another case: take another folder.\n- "
-                + "\n- ".join(changed)
+                + "\n- ".join(changes)
             )
         return
-    _write_header(header, given)
+    _write_header(header, lines)
 
 
-def _write_header(header: Path, given: Mapping[str, str]) -> None:
+def _write_header(header: Path, lines: Mapping[str, str]) -> None:
     with written_whole(header, "the study cannot be written to", error=ProblemError) as part:
-        part.write_text(json.dumps({"case": given}, indent=1), encoding="utf-8")
+        part.write_text(json.dumps({"case": lines}, indent=1), encoding="utf-8")
 
 
 def _file(folder: Path, key: str) -> Path:
@@ -672,8 +678,8 @@ def _failures(rows: Iterable[Mapping[str, Any]]) -> str:
     """Errors of cases by their kind, the most frequent ones first; empty where there are none."""
     count = Counter((row["kind"], _first_line(row["error"])) for row in rows)
     lines = [f"{n} failed with {kind}: {text}" for (kind, text), n in count.most_common(_SHOWN)]
-    left = len(count) - len(lines)
-    return "\n".join([*lines, *([f"and {left} other errors"] if left > 0 else [])])
+    n_left = len(count) - len(lines)
+    return "\n".join([*lines, *([f"and {n_left} other errors"] if n_left > 0 else [])])
 
 
 def _first_line(text: str) -> str:

@@ -164,20 +164,20 @@ def resume(
     collection = Collector(until, keep_solutions, mesh=problem.mesh)
     with lock_folder(folder) as check:
         run_folder.sweep(folder)
-        header, damaged = run_folder.read_header(folder)
+        header, damaged_file = run_folder.read_header(folder)
         if header is None:  # killed before its first step
             collection.store = RunStore(folder, check)
             return collection.of(growth_steps(run))
         _check_settings(run, header, folder)
-        stored = run_folder.read_steps(folder, header)
-        if stored.rest or damaged is not None:
-            _move_aside(folder, stored, damaged)
+        stored_steps = run_folder.read_steps(folder, header)
+        if stored_steps.rest or damaged_file is not None:
+            _move_aside(folder, stored_steps, damaged_file)
         header = replace(header, ended="")
         run_folder.write_header(folder, header)
-        steps = steps_to_go_on_from(run, stored.steps)
+        steps = steps_to_go_on_from(run, stored_steps.steps)
         collection.taken.extend(steps)
         collection.store = RunStore(folder, check, header)
-        if run.tolerance is not None and stored.steps:
+        if run.tolerance is not None and stored_steps.steps:
             collection.mesh = run_folder.read_mesh_file(folder / run_folder.MESH) or problem.mesh
         return collection.of(growth_steps(run, steps))
 
@@ -220,15 +220,15 @@ def load(path: str | Path) -> Any:
             f"load: path = {str(folder)!r} holds no run, {run_folder.HEADER} is missing: give the "
             "folder that collect wrote to."
         )
-    stored = run_folder.read_steps(folder, header)
-    if stored.rest:
+    stored_steps = run_folder.read_steps(folder, header)
+    if stored_steps.rest:
         warn(
-            f"{stored.fault} in {folder}: the {len(stored.steps)} steps before it are read. resume "
-            "computes the others again."
+            f"{stored_steps.fault} in {folder}: the {len(stored_steps.steps)} steps before it are "
+            "read. resume computes the others again."
         )
-    ended = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
+    end = header.ended or "not ended: it is still going on, or was killed; resume goes on with it"
     mesh = run_folder.read_mesh_file(folder / run_folder.MESH)
-    return History(stored.steps, ended, folder, mesh)
+    return History(stored_steps.steps, end, folder, mesh)
 
 
 @dataclass
@@ -248,24 +248,24 @@ class Collector:
             if close_steps is not None:
                 stack.callback(close_steps)
             try:
-                ended = self._take(steps)
+                end = self._take(steps)
             except KeyboardInterrupt:
-                ended = self._interrupt()
+                end = self._interrupt()
             except Exception as error:
                 # Ctrl-C within a compiled kernel is the cause of a SystemError.
                 if not _is_interrupt(error):
                     self._attach(error)
                     raise
-                ended = self._interrupt()
-        history = self._history(ended)
+                end = self._interrupt()
+        history = self._history(end)
         if self.store is not None:
             try:
-                self.store.end(ended)
+                self.store.end(end)
             except ProblemError as error:
                 self._attach(error)
                 raise
-        if ended.startswith("interrupted"):
-            warn(f"growth was {ended}: {len(self.taken)} finished steps are handed back.")
+        if end.startswith("interrupted"):
+            warn(f"growth was {end}: {len(self.taken)} finished steps are handed back.")
         return history
 
     def _take(self, steps: Iterable[Step]) -> str:
@@ -296,8 +296,8 @@ class Collector:
             return False
         if not callable(self.until):
             return self._is_on_sets(step)
-        enough = call_function(self.until, f"until, after step {step.index}", step)
-        return flag(enough, "collect: what until returned")
+        is_enough = call_function(self.until, f"until, after step {step.index}", step)
+        return flag(is_enough, "collect: what until returned")
 
     def _is_on_sets(self, step: Step) -> bool:
         """Whether the cracks of a step are on all facet sets that `until` names."""
@@ -333,33 +333,33 @@ class Collector:
             + ("." if self.store is None else f", and in {self.store.folder}: see resume.")
         )
 
-    def _history(self, ended: str) -> History:
+    def _history(self, end: str) -> History:
         folder = None if self.store is None else self.store.folder
-        return History(tuple(self.taken), ended, folder, self.mesh)
+        return History(tuple(self.taken), end, folder, self.mesh)
 
 
 def _is_interrupt(error: BaseException) -> bool:
     if isinstance(error, KeyboardInterrupt):
         return True
-    before = error.__cause__ or error.__context__
-    return isinstance(error, SystemError) and before is not None and _is_interrupt(before)
+    cause = error.__cause__ or error.__context__
+    return isinstance(error, SystemError) and cause is not None and _is_interrupt(cause)
 
 
 def _check_settings(run: GrowthRule, header: RunHeader, folder: Path) -> None:
     """Refuse to go on with a run of other settings; warn of other versions."""
     settings, current_versions = run.settings, versions()
-    compiled: list[str] = []
+    compiled_keys: list[str] = []
     if header.versions.get("python") != current_versions["python"]:
-        compiled = only_compiled_differently(header.settings, settings)
-    given = {**settings, **{key: header.settings[key] for key in compiled}}
-    lines = differences(header.settings, given, run.default_settings)
+        compiled_keys = only_compiled_differently(header.settings, settings)
+    settings_of_run = {**settings, **{key: header.settings[key] for key in compiled_keys}}
+    lines = differences(header.settings, settings_of_run, run.default_settings)
     if lines:
         raise ProblemError(
             f"the run in {folder} was made with other settings: {_first_differences(lines)}. Give "
             f"those, or begin another run in another folder."
         )
     lines = differences(header.versions, current_versions)
-    lines += [f"{key}: its code cannot be compared between the two" for key in compiled]
+    lines += [f"{key}: its code cannot be compared between the two" for key in compiled_keys]
     if lines:
         warn(
             f"the run in {folder} was made with other versions, on another processor or with "
@@ -380,19 +380,24 @@ def _refuse_stored(folder: Path) -> None:
     )
 
 
-def _move_aside(folder: Path, stored: run_folder.StoredSteps, damaged: Path | None) -> None:
+def _move_aside(
+    folder: Path, stored_steps: run_folder.StoredSteps, damaged_file: Path | None
+) -> None:
     """Move aside what does not belong to the part of a run that is whole, and warn of it."""
-    files = [*stored.rest, *([] if damaged is None else [damaged])]
-    aside = run_folder.move_aside(folder, files)
-    if stored.rest:
-        last = len(stored.steps) - 1
-        begin = f"growth goes on from step {last}" if stored.steps else "growth begins anew"
+    files = [*stored_steps.rest, *([] if damaged_file is None else [damaged_file])]
+    new_folder = run_folder.move_aside(folder, files)
+    if stored_steps.rest:
+        last = len(stored_steps.steps) - 1
+        begin = f"growth goes on from step {last}" if stored_steps.steps else "growth begins anew"
         warn(
-            f"{stored.fault} in {folder}: {begin}; {len(stored.rest)} files of steps were moved to "
-            f"{aside}."
+            f"{stored_steps.fault} in {folder}: {begin}; {len(stored_steps.rest)} files of steps "
+            f"were moved to {new_folder}."
         )
-    if damaged is not None:
-        warn(f"{damaged} was damaged: it was moved to {aside}, and made again from the steps.")
+    if damaged_file is not None:
+        warn(
+            f"{damaged_file} was damaged: it was moved to {new_folder}, and made again "
+            "from the steps."
+        )
 
 
 def names_of_sets(value: Any, what: str) -> tuple[str, ...]:
@@ -420,8 +425,8 @@ def _check_options(caller: str, until: Any, **flags: Any) -> None:
 
 def _first_differences(lines: list[str]) -> str:
     """The first few of many differences, in one line."""
-    more = len(lines) - _SHOWN
-    return "; ".join(lines[:_SHOWN]) + (f"; and {more} more" if more > 0 else "")
+    n_more = len(lines) - _SHOWN
+    return "; ".join(lines[:_SHOWN]) + (f"; and {n_more} more" if n_more > 0 else "")
 
 
 __all__ = ["Until", "collect", "load", "names_of_sets", "resume"]

@@ -121,8 +121,8 @@ class History:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all tips, in 3D fronts, by their identity: the column ``id`` of `table`."""
-        known = [step.identities for step in self.steps if step.identities is not None]
-        return known[-1].names if known else ()
+        identities = [step.identities for step in self.steps if step.identities is not None]
+        return identities[-1].names if identities else ()
 
     @property
     def warnings(self) -> dict[str, int]:

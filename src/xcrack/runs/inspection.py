@@ -180,8 +180,8 @@ def growth_curve(
         raise ProblemError(f"growth_curve: history = {value_text(history)}: give a History.")
     if measure is not None and not isinstance(measure, str):
         raise ProblemError(f"growth_curve: measure = {value_text(measure)}: give {_MEASURES}.")
-    flat = history.steps[0].cracks[0].dim == 2
-    if measure is None and not flat:
+    is_plane = history.steps[0].cracks[0].dim == 2
+    if measure is None and not is_plane:
         measure = "root_area"
     if measure not in (None, _ADVANCE):
         return _measured_curve(history, measure, crack)
@@ -221,9 +221,9 @@ def _measured_curve(history: History, measure: str, crack: int | None) -> Growth
     line = _line_of(steps, values, crack)
     a = np.array([of[c] for of, c in zip(values, line, strict=True)])
     N = np.array([step.cycles for step in steps])
-    unknown = ~(np.isfinite(a) & (a > 0))
-    if unknown.any():
-        index = steps[int(np.argmax(unknown))].index
+    is_unknown = ~(np.isfinite(a) & (a > 0))
+    if is_unknown.any():
+        index = steps[int(np.argmax(is_unknown))].index
         raise ProblemError(
             f"growth_curve: the crack has no {measure!r} at step {index}: give {_MEASURES}."
         )
@@ -236,14 +236,14 @@ def _measured_curve(history: History, measure: str, crack: int | None) -> Growth
             "which it rises, History(history.steps[:n], ended='', mesh=history.mesh)."
         )
     a = np.maximum.accumulate(a)
-    grows, cycles = np.diff(a), np.diff(N)
+    growth, cycles = np.diff(a), np.diff(N)
     with np.errstate(divide="ignore", invalid="ignore"):
-        rate = np.repeat((grows / cycles)[:, None], 2, axis=1)
+        rate = np.repeat((growth / cycles)[:, None], 2, axis=1)
     if _settings(steps).get("retardation", "None") == "None":
         lead: DrivingForce = driving_forces(history.steps).lead
         for n, ends, advance in zip(lead.step, _bounded_rates(lead.rate), np.diff(lead.a).ravel()):
             if n < len(rate) and advance > 0:
-                rate[n] = ends * grows[n] / advance
+                rate[n] = ends * growth[n] / advance
     if measure == "length":
         N, a, rate = _with_jumps(steps, line, N, a, rate)
     return GrowthCurve(N, a, rate, measure)
@@ -257,9 +257,9 @@ def _with_jumps(
         c = line[n]
         if not any(c in join.cracks for join in steps[n + 1].joins):
             continue
-        alone = min(float(a[n] + steps[n].da[c].sum()), float(a[n + 1]))
-        share = (alone - a[n]) / (a[n + 1] - a[n]) if a[n + 1] > a[n] else 1.0
-        N, a = np.insert(N, n + 1, N[n + 1]), np.insert(a, n + 1, alone)
+        size_before_join = min(float(a[n] + steps[n].da[c].sum()), float(a[n + 1]))
+        share = (size_before_join - a[n]) / (a[n + 1] - a[n]) if a[n + 1] > a[n] else 1.0
+        N, a = np.insert(N, n + 1, N[n + 1]), np.insert(a, n + 1, size_before_join)
         rate = np.insert(rate, n + 1, 1.0, axis=0)
         rate[n] *= share
     return N, a, rate
@@ -271,8 +271,8 @@ def _settings(steps: Sequence[Step]) -> Any:
 
 def _measures_of(history: History, steps: Sequence[Step], measure: str) -> list[list[float]]:
     """The measure of each crack of each step."""
-    flat = steps[0].cracks[0].dim == 2
-    if flat and measure == "length":
+    is_plane = steps[0].cracks[0].dim == 2
+    if is_plane and measure == "length":
         if not all(step.sizes for step in steps):
             raise ProblemError(
                 "growth_curve: the history has steps without sizes of their cracks: give "
@@ -281,13 +281,14 @@ def _measures_of(history: History, steps: Sequence[Step], measure: str) -> list[
         return [list(step.sizes) for step in steps]
     table, _ = history.measures()
     names = [n for n in table.dtype.names or () if n.startswith(("depth", "length_"))]
-    if flat:
-        known = ["length", *(n for n in names if n.startswith("depth"))]
+    if is_plane:
+        measure_names = ["length", *(n for n in names if n.startswith("depth"))]
     else:
-        known = ["root_area", "front_length", *names]
-    if measure not in known:
+        measure_names = ["root_area", "front_length", *names]
+    if measure not in measure_names:
         raise ProblemError(
-            f"growth_curve: measure = {value_text(measure)}: the run has {', '.join(known)}."
+            f"growth_curve: measure = {value_text(measure)}: the run has "
+            f"{', '.join(measure_names)}."
         )
     column = np.sqrt(table["area"]) if measure == "root_area" else table[measure]
     return [column[table["step"] == step.index].tolist() for step in steps]
@@ -298,7 +299,7 @@ def _line_of(
 ) -> list[int]:
     """Number of a crack at each step: the one that is named, or back from the one that leads."""
     pairs = list(zip(steps, steps[1:], strict=False))
-    after = [numbers_after(len(a.cracks), b.joins, len(b.cracks)) for a, b in pairs]
+    numbers_of_pairs = [numbers_after(len(a.cracks), b.joins, len(b.cracks)) for a, b in pairs]
     if crack is not None:
         first = crack_numbers(steps[0])
         if isinstance(crack, bool) or crack not in first:
@@ -307,16 +308,18 @@ def _line_of(
                 f"begins with: {', '.join(map(str, first))}."
             )
         line = [first.index(crack)]
-        for numbers_there in after:
+        for numbers_there in numbers_of_pairs:
             line.append(numbers_there[line[-1]])
         return line
     last = max(n for n, step in enumerate(steps) if n == 0 or not step.has_left)
     rate = [float(of_crack.max(initial=0)) for of_crack in steps[last].law_rate]
     line = [max(range(len(rate)), key=lambda c: (rate[c], _length_or_zero(values[last][c])))]
-    for numbers_there, before in zip(after[:last][::-1], values[:last][::-1], strict=True):
-        joined = [c for c, now in enumerate(numbers_there) if now == line[0]]
-        line.insert(0, max(joined, key=lambda c: _length_or_zero(before[c])))
-    for numbers_there in after[last:]:
+    for numbers_there, sizes in zip(
+        numbers_of_pairs[:last][::-1], values[:last][::-1], strict=True
+    ):
+        joined_cracks = [c for c, number in enumerate(numbers_there) if number == line[0]]
+        line.insert(0, max(joined_cracks, key=lambda c: _length_or_zero(sizes[c])))
+    for numbers_there in numbers_of_pairs[last:]:
         line.append(numbers_there[line[-1]])
     return line
 
@@ -401,12 +404,12 @@ def inspection(
         )
     at = np.arange(first, last, every)
     a = np.array([curve.length_at(N) for N in at])
-    missed = (
+    probability_missed = (
         None
         if pod is None
         else float(np.prod([1 - _detection_probability(pod, each) for each in a]))
     )
-    return Inspection(first, every, at, a, missed, curve.measure)
+    return Inspection(first, every, at, a, probability_missed, curve.measure)
 
 
 def _detection_probability(pod: Any, a: float) -> float:

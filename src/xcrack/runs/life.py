@@ -116,8 +116,8 @@ class Life:
             f"life {self.life:.4g} {self.unit}s; median {middle:.4g}, 90 % of {len(self.N)} "
             f"samples from {low:.4g} to {high:.4g}"
         ]
-        for name, (least, most) in self.scatter.items():
-            lines.append(f"  {name} alone: from {least:.4g} to {most:.4g}")
+        for name, (least_life, largest_life) in self.scatter.items():
+            lines.append(f"  {name} alone: from {least_life:.4g} to {largest_life:.4g}")
         for name, share in self.bounds.items():
             bound = f"at most {share:.2%} of the life (a bound)" if share == share else "not known"
             lines.append(f"  error of {name}: {bound}")
@@ -209,21 +209,21 @@ def life(
     limit = number(max_blocks, "life: max_blocks", above=0)
     _warn_of_validity(history)
     if retardation is not None:
-        cycled = RetardedLives(history, law, block, retardation, limit)
-        return _retarded_lives(cycled, history, law, scatter, block, n, seed, unit)
+        retarded_lives = RetardedLives(history, law, block, retardation, limit)
+        return _retarded_lives(retarded_lives, history, law, scatter, block, n, seed, unit)
     rows = _rows(history, law, scatter, block)
     lead = rows.lead
-    drawn = scatter.draw(n, seed)
-    if "a0" in drawn:
-        drawn["a0"] = _checked_sizes(lead, drawn["a0"])
+    drawn_samples = scatter.draw(n, seed)
+    if "a0" in drawn_samples:
+        drawn_samples["a0"] = _checked_sizes(lead, drawn_samples["a0"])
     bounds = _bounds(history, rows, law, scatter, block)
-    N = np.sort(lives(lead, law, drawn, n))
-    alone = {
-        name: _ends(lives(lead, law, {name: values}, n)) if len(drawn) > 1 else _ends(N)
-        for name, values in drawn.items()
+    N = np.sort(lives(lead, law, drawn_samples, n))
+    bounds_by_part = {
+        name: _ends(lives(lead, law, {name: values}, n)) if len(drawn_samples) > 1 else _ends(N)
+        for name, values in drawn_samples.items()
     }
     word = unit or ("cycle" if block is None else block.spectrum.unit)
-    return Life(lock(N + history.steps[0].cycles), history.life, alone, bounds, word)
+    return Life(lock(N + history.steps[0].cycles), history.life, bounds_by_part, bounds, word)
 
 
 def _warn_of_validity(history: History) -> None:
@@ -235,8 +235,8 @@ def _warn_of_validity(history: History) -> None:
         if problem.elasticity.material.yield_stress is None:
             continue
         mesh = problem.mesh
-        known = validity(problem.elasticity.material, mesh, step.cracks, step.sif, step.solutions)
-        alarms = [] if known is None else known.alarms()
+        check = validity(problem.elasticity.material, mesh, step.cracks, step.sif, step.solutions)
+        alarms = [] if check is None else check.alarms()
         if alarms:
             share = 1 - step.cycles / history.life if history.life > 0 else 1.0
             warn(
@@ -270,7 +270,7 @@ def _bounds(
 
 
 def _retarded_lives(
-    cycled: RetardedLives,
+    retarded_lives: RetardedLives,
     history: History,
     law: Law | None,
     scatter: Scatter,
@@ -285,27 +285,29 @@ def _retarded_lives(
             "life: a0 varies: with retardation each first crack is a run of its own."
         )
     _rows(history, law, scatter, block)
-    drawn = scatter.draw(n, seed)
-    N = np.sort(cycled.lives(drawn, n))
-    alone = {
-        name: _ends(cycled.lives({name: values}, n)) if len(drawn) > 1 else _ends(N)
-        for name, values in drawn.items()
+    samples = scatter.draw(n, seed)
+    N = np.sort(retarded_lives.lives(samples, n))
+    bounds_by_part = {
+        name: _ends(retarded_lives.lives({name: values}, n)) if len(samples) > 1 else _ends(N)
+        for name, values in samples.items()
     }
-    bounds = {"steps": float("nan"), "K": cycled.of_K()}
-    word = unit or cycled.unit
-    return Life(lock(N), cycled.life, alone, bounds, word)
+    bounds = {"steps": float("nan"), "K": retarded_lives.of_K()}
+    word = unit or retarded_lives.unit
+    return Life(lock(N), retarded_lives.life, bounds_by_part, bounds, word)
 
 
 def _rows(
     history: History, law: Law | None, scatter: Scatter, block: SpectrumBlock | None
 ) -> DrivingForce:
     """Places of the run, where the law and the spectrum are those that it had."""
-    needs = set(scatter.parts) - {"C", "a0"}
+    missing_names = set(scatter.parts) - {"C", "a0"}
     if law is None:
-        if needs:
-            raise ProblemError(f"life: {', '.join(sorted(needs))} varies: give the law of the run.")
+        if missing_names:
+            raise ProblemError(
+                f"life: {', '.join(sorted(missing_names))} varies: give the law of the run."
+            )
         return driving_forces(history.steps)
-    if needs or block is not None:
+    if missing_names or block is not None:
         check_block(history.steps, block, law, "life")
     rows = driving_forces(history.steps, block)
     if (block is not None or not history.steps[0].levels) and not np.allclose(
@@ -315,7 +317,7 @@ def _rows(
             "life: the law gives other rates than those of the run: give the law that it had, and "
             "its spectrum, or take history.rerate(law)."
         )
-    if block is not None and "load" in needs and not _is_proportional(history, block):
+    if block is not None and "load" in missing_names and not _is_proportional(history, block):
         raise ProblemError(
             "life: load varies, but K of this run is not in proportion to it: it has steady loads "
             "or initial stress. Run it with other loads, Spectrum.scaled, to see what they do."
@@ -337,11 +339,11 @@ def _checked_sizes(lead: DrivingForce, sizes: Floats) -> Floats:
             "that it began with. Run it for other cracks."
         )
     first = float(lead.a[0, 0])
-    below = float((sizes < first).mean())
-    if below > 0.01:
+    share_below = float((sizes < first).mean())
+    if share_below > 0.01:
         raise ProblemError(
-            f"life: {below:.1%} of the samples of a0 are below {first:.6g}, the first crack of the "
-            "run: begin the run with a smaller crack."
+            f"life: {share_below:.1%} of the samples of a0 are below {first:.6g}, the first crack "
+            "of the run: begin the run with a smaller crack."
         )
     return np.maximum(sizes, first)
 
@@ -364,9 +366,9 @@ def _of_steps(lead: DrivingForce) -> float:
 
 def _change_of_life(lead: DrivingForce, rate: Floats) -> float:
     """Share by which the life is another one with other rates."""
-    counted = lead.cycles / cycles_of(lead.a, lead.rate)
-    nominal = float(lead.cycles.sum())
-    return abs(float((cycles_of(lead.a, rate) * counted).sum()) - nominal) / nominal
+    blocks = lead.cycles / cycles_of(lead.a, lead.rate)
+    nominal_life = float(lead.cycles.sum())
+    return abs(float((cycles_of(lead.a, rate) * blocks).sum()) - nominal_life) / nominal_life
 
 
 def _of_K(lead: DrivingForce, law: Law) -> float:
@@ -378,13 +380,13 @@ def _of_levels(history: History, lead: DrivingForce, law: Law, block: SpectrumBl
     """A third of the change of the life with every second level left out."""
     if all(block.is_solved(step) for step in history.steps):
         return 0.0
-    coarse = driving_forces(history.steps, replace(block, is_thinned=True)).lead
-    return _change_of_life(lead, coarse.rates(law)) / 3
+    coarse_lead = driving_forces(history.steps, replace(block, is_thinned=True)).lead
+    return _change_of_life(lead, coarse_lead.rates(law)) / 3
 
 
 def _of_tips(rows: DrivingForce, law: Law, scatter: Scatter) -> float:
     """Largest change of shares of the advance, of the 5 and 95 % samples of each source alone."""
-    counted, worst = rows.cycles[rows.step[rows.drives]], 0.0
+    cycles, worst = rows.cycles[rows.step[rows.drives]], 0.0
     for name, part in scatter.parts.items():
         if name in ("C", "a0"):
             continue
@@ -395,7 +397,7 @@ def _of_tips(rows: DrivingForce, law: Law, scatter: Scatter) -> float:
                 if is_own_constant
                 else rows.rates(law, value)
             )
-            worst = max(worst, bound_of_shares(rows, rate[:, 0], counted))
+            worst = max(worst, bound_of_shares(rows, rate[:, 0], cycles))
     if worst > _MOST:
         raise ProblemError(
             f"life: some samples would have shared the advance of the tips another way, by "

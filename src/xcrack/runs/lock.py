@@ -101,18 +101,18 @@ def _create_lock(path: Path, owner: dict[str, Any]) -> bool:
     return True
 
 
-def _remove(path: Path, stale: dict[str, Any]) -> None:
+def _remove(path: Path, stale_owner: dict[str, Any]) -> None:
     """Remove the lock of a dead owner, and no other one that appeared meanwhile."""
-    aside = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
+    new_path = path.with_name(f".{path.name}.{secrets.token_hex(8)}.part")
     try:
-        os.rename(path, aside)  # of several who try, one succeeds
+        os.rename(path, new_path)  # of several who try, one succeeds
     except FileNotFoundError:
         return
-    if _read(aside) != stale:  # a new owner was faster: give the lock back
+    if _read(new_path) != stale_owner:  # a new owner was faster: give the lock back
         with contextlib.suppress(OSError):
-            os.link(aside, path)
+            os.link(new_path, path)
     with contextlib.suppress(OSError):
-        aside.unlink()
+        new_path.unlink()
 
 
 def _read(path: Path) -> dict[str, Any] | None:
@@ -125,34 +125,34 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 
 def _in_use(path: Path, owner: dict[str, Any]) -> str:
-    this = _this_process()
-    if not _is_here(owner, this):
+    process = _this_process()
+    if not _is_here(owner, process):
         return (
             f"{path.parent} is in use by process {owner['pid']} on {owner.get('host')} since "
             f"{owner.get('taken')}. If that process has ended, delete {path}; resume then goes on "
             "with the run."
         )
-    who = "this process" if owner["pid"] == this["pid"] else f"process {owner['pid']}"
+    user = "this process" if owner["pid"] == process["pid"] else f"process {owner['pid']}"
     return (
-        f"{path.parent} is in use by {who} since {owner.get('taken')}: wait for its end, or give "
+        f"{path.parent} is in use by {user} since {owner.get('taken')}: wait for its end, or give "
         "each run a folder of its own."
     )
 
 
 def _may_live(owner: dict[str, Any]) -> bool:
     """Whether the owner of a lock may still write; of another machine it may."""
-    this = _this_process()
-    if _is_here(owner, this):
-        started = _start_of_process(owner["pid"])
-        return started is not None and started == owner.get("started")
-    restarted = owner.get("host") == this["host"] and owner.get("boot") != this["boot"]
-    return not restarted or this["host"] in _NAMELESS
+    process = _this_process()
+    if _is_here(owner, process):
+        start = _start_of_process(owner["pid"])
+        return start is not None and start == owner.get("started")
+    is_restarted = owner.get("host") == process["host"] and owner.get("boot") != process["boot"]
+    return not is_restarted or process["host"] in _NAMELESS
 
 
-def _is_here(owner: dict[str, Any], this: dict[str, Any]) -> bool:
+def _is_here(owner: dict[str, Any], process: dict[str, Any]) -> bool:
     """Whether process ids mean the same to both."""
     compared_keys = ("host", "boot", "namespace")
-    return all(owner.get(key) == this[key] for key in compared_keys)
+    return all(owner.get(key) == process[key] for key in compared_keys)
 
 
 def _this_process() -> dict[str, Any]:
@@ -190,10 +190,10 @@ def _start_of_process(pid: Any) -> str | None:
         ctypes.windll.kernel32.GetProcessTimes(handle, *pointers)
         ctypes.windll.kernel32.CloseHandle(handle)
         return None if times[1] else str(times[0])
-    listed = subprocess.run(
+    answer = subprocess.run(
         ["ps", "-o", "lstart=", "-p", str(pid)], capture_output=True, text=True, check=False
     )
-    return listed.stdout.strip() or None
+    return answer.stdout.strip() or None
 
 
 def _time_now() -> str:

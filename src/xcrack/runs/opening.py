@@ -67,26 +67,26 @@ def opening_load(step: Step) -> OpeningLoad:
         _of_crack(levels, np.stack([s[c].K[:, 0] for s in step.sif]))
         for c in range(len(step.cracks))
     ]
-    level, U, between = zip(*parts, strict=True)
-    return OpeningLoad(level, U, between)
+    level, U, level_gap = zip(*parts, strict=True)
+    return OpeningLoad(level, U, level_gap)
 
 
 def _of_crack(levels: Floats, K: Floats) -> tuple[Floats, Floats, Floats]:
     """Level, share and distance of levels at each place, from K_I `(n, f)`."""
     n, f = K.shape
-    level, between = np.full(f, np.nan), np.zeros(f)
+    level, level_gap = np.full(f, np.nan), np.zeros(f)
     for place in range(f):
-        closed = K[:, place] <= _CLOSED * np.abs(K[:, place]).max(initial=0.0)
-        if closed.all():
+        is_closed = K[:, place] <= _CLOSED * np.abs(K[:, place]).max(initial=0.0)
+        if is_closed.all():
             continue
-        last = int(np.nonzero(closed)[0].max()) if closed.any() else -1
+        last = int(np.nonzero(is_closed)[0].max()) if is_closed.any() else -1
         if last < 0:
             level[place] = levels[0]
         elif last == n - 1:
             continue  # closes under the largest load
         else:
             level[place] = levels[last]
-            between[place] = levels[last + 1] - levels[last]
+            level_gap[place] = levels[last + 1] - levels[last]
             if last + 2 < n:
                 low, high = K[last + 1, place], K[last + 2, place]
                 slope = (high - low) / (levels[last + 2] - levels[last + 1])
@@ -95,7 +95,7 @@ def _of_crack(levels: Floats, K: Floats) -> tuple[Floats, Floats, Floats]:
             elif levels[last] < 0 < levels[-1]:
                 level[place] = 0.0  # two levels: K is in proportion to the factor
     share = (levels[-1] - level) / (levels[-1] - levels[0])
-    return level, np.nan_to_num(share), between
+    return level, np.nan_to_num(share), level_gap
 
 
 __all__ = ["OpeningLoad", "opening_load"]

@@ -70,8 +70,8 @@ class SpectrumBlock:
             ends = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
             count = np.repeat(count[:, None], K.shape[1], axis=1)
         _, p, f, modes = ends.shape
-        flat = ends.reshape(2, p * f, modes)
-        _, dK, R = evaluate_criterion(self.criterion, flat, self.nu, c, "place of a cycle")
+        K_of_ends = ends.reshape(2, p * f, modes)
+        _, dK, R = evaluate_criterion(self.criterion, K_of_ends, self.nu, c, "place of a cycle")
         return dK.reshape(p, f), R.reshape(p, f), count
 
     def _ladder(self, step: Step, K: Floats) -> LevelTable:
@@ -93,15 +93,17 @@ class SpectrumBlock:
         """
         spectrum = self.spectrum
         if spectrum.states is not None:
-            fits = not step.levels and len(spectrum.states) == len(step.sif)
+            has_levels = not step.levels and len(spectrum.states) == len(step.sif)
         else:
             low, high = spectrum.extremes
             size = _NEAR * max(abs(low), abs(high))
-            fits = bool(step.levels) and len(step.levels) == len(step.sif)
-            fits = (
-                fits and abs(step.levels[0] - low) <= size and abs(step.levels[-1] - high) <= size
+            has_levels = bool(step.levels) and len(step.levels) == len(step.sif)
+            has_levels = (
+                has_levels
+                and abs(step.levels[0] - low) <= size
+                and abs(step.levels[-1] - high) <= size
             )
-        if not fits:
+        if not has_levels:
             raise ProblemError(
                 f"{what}: spectrum is another one than that of step {step.index}, whose load "
                 f"states are {list(step.levels) or len(step.sif)}: give that of the run."
@@ -129,9 +131,9 @@ def block_of_run(
     ProblemError
         Some of them without the others, or of another type.
     """
-    least = number(threshold, f"{what}: threshold", least=0)
+    least_range = number(threshold, f"{what}: threshold", least=0)
     if spectrum is None and criterion is None and nu is None:
-        if least:
+        if least_range:
             raise ProblemError(f"{what}: threshold belongs to a spectrum: give spectrum=... too.")
         return None
     if not isinstance(spectrum, Spectrum):
@@ -141,7 +143,9 @@ def block_of_run(
             f"{what}: criterion = {value_text(criterion)}: give that of the run; each cycle of the "
             "spectrum is held against it again."
         )
-    return SpectrumBlock(spectrum, criterion, number(nu, f"{what}: nu", above=-1, below=0.5), least)
+    return SpectrumBlock(
+        spectrum, criterion, number(nu, f"{what}: nu", above=-1, below=0.5), least_range
+    )
 
 
 # The place that drives each step of a run: its lengths, ranges and rates before and after.
@@ -250,12 +254,12 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
             "come at other lengths. Grow with the other law, or give load_over_size."
         )
     rows: list[tuple[float, ...]] = []
-    for n, (step, after) in enumerate(zip(steps, steps[1:])):
-        rows += _of_step(n, step, after)
+    for n, (step, next_step) in enumerate(zip(steps, steps[1:])):
+        rows += _of_step(n, step, next_step)
     if not rows:
         raise ProblemError("no place of the history grows: there is no life to look at.")
     table = np.array(rows)
-    index, crack, place, drives, da, flags = table[:, :6].T
+    index, crack, place, is_driving, da, flags = table[:, :6].T
     pairs = table[:, 6:].reshape(len(table), 2, 6)
     a, dK, R, rate, size, spread = np.moveaxis(pairs, 2, 0)
     step, where = index.astype(np.int64), np.stack([crack, place, flags], axis=1).astype(np.int64)
@@ -263,7 +267,7 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
     ranges, ratios, count = one if block is None else _of_blocks(steps, block, step, where)
     return DrivingForce(
         step=step,
-        drives=drives.astype(bool),
+        drives=is_driving.astype(bool),
         place=where[:, :2],
         da=da,
         a=a,
@@ -290,10 +294,10 @@ def _of_blocks(
         return tuple(part[:, j] for part in answers[n, c])
 
     rows = []
-    for n, (c, j, there) in zip(step.tolist(), where.tolist()):
+    for n, (c, j, next_place) in zip(step.tolist(), where.tolist()):
         first = at(n, c, j)
-        now = _numbers(steps[n], steps[n + 1])[c]
-        rows += [first, first if there < 0 else at(n + 1, now, there)]
+        next_number = _numbers(steps[n], steps[n + 1])[c]
+        rows += [first, first if next_place < 0 else at(n + 1, next_number, next_place)]
     p = max(len(row[0]) for row in rows)
     result = np.zeros((3, len(rows), p))  # kinds of cycles that a step does not have: none of them
     for k, row in enumerate(rows):
@@ -302,27 +306,29 @@ def _of_blocks(
     return dK, R, count
 
 
-def _numbers(step: Step, after: Step) -> list[int]:
+def _numbers(step: Step, next_step: Step) -> list[int]:
     """Number that each crack of a step has in the next one."""
-    return numbers_after(len(step.cracks), after.joins, len(after.cracks))
+    return numbers_after(len(step.cracks), next_step.joins, len(next_step.cracks))
 
 
-def _of_step(number: int, step: Step, after: Step) -> list[tuple[float, ...]]:
-    ligament = {(arrival.crack, arrival.tip): arrival.ligament for arrival in after.arrivals}
+def _of_step(number: int, step: Step, next_step: Step) -> list[tuple[float, ...]]:
+    ligament = {(arrival.crack, arrival.tip): arrival.ligament for arrival in next_step.arrivals}
     rows = []
-    joined = {c for join in after.joins for c in join.cracks}
-    for c, now in enumerate(_numbers(step, after)):
+    joined_cracks = {c for join in next_step.joins for c in join.cracks}
+    for c, next_number in enumerate(_numbers(step, next_step)):
         da, rate = step.da[c], step.law_rate[c]
-        grows = np.nonzero((da > 0) & (rate > 0))[0]
-        if not len(grows):
+        growing_places = np.nonzero((da > 0) & (rate > 0))[0]
+        if not len(growing_places):
             continue
-        moved, there = moved_places(step, c), after.sif[0][now].x
-        for j in grows.tolist():
+        moved_x, next_x = moved_places(step, c), next_step.sif[0][next_number].x
+        for j in growing_places.tolist():
             a, way = step.sizes[c] * float(da[j] / da.sum()), float(da[j])
             first = _values(step, c, j, a, step.sizes[c])
-            distance, k = cKDTree(there).query(moved[j]) if len(there) else (np.inf, 0)
-            if distance <= _NEAR_ADVANCE * da[j] and c not in joined:
-                last = _values(after, now, int(k), a + da[j], after.sizes[now])
+            distance, k = cKDTree(next_x).query(moved_x[j]) if len(next_x) else (np.inf, 0)
+            if distance <= _NEAR_ADVANCE * da[j] and c not in joined_cracks:
+                last = _values(
+                    next_step, next_number, int(k), a + da[j], next_step.sizes[next_number]
+                )
             else:  # it has left the body, or joined another crack: its rate stays what it was
                 way = ligament.get((c, j), way)
                 k, last = -1, (a + way, *first[1:])
@@ -346,10 +352,10 @@ def _values(step: Step, c: int, j: int, a: float, length: float) -> tuple[float,
 def cycles_of(a: Floats, rate: Floats) -> Floats:
     """Cycles from a[..., 0] to a[..., 1]; inf where nothing grows, 0 beyond the toughness."""
     first, last = rate[..., 0], rate[..., 1]
-    grows = (first > 0) & np.isfinite(first)
-    safe = np.where(grows, first, 1.0)
-    cycles = cycles_between(a[..., 0], a[..., 1], safe, np.where(grows, last, 1.0))
-    return np.where(grows, cycles, np.where(first > 0, 0.0, np.inf))
+    is_growing = (first > 0) & np.isfinite(first)
+    safe_rate = np.where(is_growing, first, 1.0)
+    cycles = cycles_between(a[..., 0], a[..., 1], safe_rate, np.where(is_growing, last, 1.0))
+    return np.where(is_growing, cycles, np.where(first > 0, 0.0, np.inf))
 
 
 _MOST = 0.05
@@ -421,11 +427,12 @@ def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) ->
     """
     for solution in steps[0].solutions:
         problem = solution.problem
-        steady = [load.name for load in problem.loads if load.is_steady]
-        if steady or any(problem.frictions):
+        steady_loads = [load.name for load in problem.loads if load.is_steady]
+        if steady_loads or any(problem.frictions):
             raise ProblemError(
-                f"{what}: {steady[0] if steady else 'friction'} does not scale with the loads, so "
-                "K is not in proportion to them: grow the cracks under loads of that size."
+                f"{what}: {steady_loads[0] if steady_loads else 'friction'} does not scale with "
+                "the loads, so K is not in proportion to them: grow the cracks under loads of "
+                "that size."
             )
     R = rows.lead.R
     if np.ptp(R, axis=1).max(initial=0.0) > _SAME_RATIO or (
@@ -441,7 +448,7 @@ def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) ->
 def recompute_rates(
     steps: Sequence[Step],
     law: Law,
-    old: Law | None = None,
+    old_law: Law | None = None,
     block: SpectrumBlock | None = None,
     program: LoadProgram | None = None,
 ) -> RecomputedRates:
@@ -451,7 +458,7 @@ def recompute_rates(
     ----------
     steps : sequence of Step
     law : callable
-    old : callable, optional
+    old_law : callable, optional
         Law of the run, to be sure that ranges and ratios of the steps are what it was given.
     block : SpectrumBlock, optional
         Of a run under a spectrum.
@@ -465,14 +472,14 @@ def recompute_rates(
         advance another way, by more than 5 %; a spectrum that is not given, or another one; a law
         with nominal R under it; the new law lets nothing grow.
     """
-    for name, value in (("law", law), ("old", old)):
+    for name, value in (("law", law), ("old", old_law)):
         if not (callable(value) or (name == "old" and value is None)):
             raise ProblemError(
                 f"rerate: {name} = {value_text(value)} cannot be called: give a law."
             )
     check_block(steps, block, law, "rerate")
     rows = driving_forces(steps, block)
-    if old is not None and not np.allclose(rows.rates(old), rows.rate, rtol=1e-6, atol=0):
+    if old_law is not None and not np.allclose(rows.rates(old_law), rows.rate, rtol=1e-6, atol=0):
         raise ProblemError("rerate: the steps have other rates than the law they are said to have.")
     first, scale = rows.drives, np.ones((int(rows.drives.sum()), 2))
     if program is None:
@@ -482,20 +489,20 @@ def recompute_rates(
         scale = _factors(program, rows)
         rate = rows.rates(law, scale[np.searchsorted(rows.step[first], rows.step)])
     if not (rate[first][:, 0] > 0).all():
-        stopped = int(np.argmin(rate[first][:, 0] > 0))
+        stop = int(np.argmin(rate[first][:, 0] > 0))
         raise ProblemError(
-            f"rerate: by this law the driving tip does not grow at step {stopped}: the path ends "
+            f"rerate: by this law the driving tip does not grow at step {stop}: the path ends "
             "there. Run it with the law to see where."
         )
     with np.errstate(invalid="ignore"):
         share = cycles_of(rows.a[first], rate[first]) / cycles_of(rows.a[first], rows.rate[first])
     since = rows.cycles[rows.step[first]] * share
-    broken = np.isinf(rate[first]).any(axis=1)
-    ended = ""
-    if broken.any():
-        last = int(np.argmax(broken))
+    is_broken = np.isinf(rate[first]).any(axis=1)
+    end = ""
+    if is_broken.any():
+        last = int(np.argmax(is_broken))
         since = since[: last + 1]
-        ended = f"the law returns inf in step {last}: its toughness is reached"
+        end = f"the law returns inf in step {last}: its toughness is reached"
     bound = bound_of_shares(rows, rate[:, 0], since)
     if bound > _MOST:
         raise ProblemError(
@@ -505,7 +512,7 @@ def recompute_rates(
         )
     factor = np.concatenate([scale[:1, 0], scale[: len(since), 1]])
     return RecomputedRates(
-        np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, ended, factor
+        np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, end, factor
     )
 
 
@@ -534,24 +541,28 @@ def check_block(
         )
 
 
-def bound_of_shares(rows: DrivingForce, new: Floats, since: Floats) -> float:
+def bound_of_shares(rows: DrivingForce, new_rates: Floats, since: Floats) -> float:
     """Mean over the cycles of the largest change of an advance over that of the driving place.
 
     Parameters
     ----------
     rows : DrivingForce
-    new : (k,) array
+    new_rates : (k,) array
         Other rates before the steps.
     since : (n,) array
         Cycles by them of the steps that are reached.
     """
-    old, first = rows.rate[:, 0], np.unique(rows.step)
+    old_rates, first = rows.rate[:, 0], np.unique(rows.step)
     worst = np.zeros(len(since))
     for n, step in enumerate(first[: len(since)].tolist()):
         is_of_step = rows.step == step
         lead = is_of_step & rows.drives
         with np.errstate(invalid="ignore"):
-            change = np.abs((new[is_of_step] / old[is_of_step]) / (new[lead] / old[lead]) - 1)
+            change = np.abs(
+                (new_rates[is_of_step] / old_rates[is_of_step])
+                / (new_rates[lead] / old_rates[lead])
+                - 1
+            )
         worst[n] = np.nan_to_num(
             change * rows.da[is_of_step] / rows.da[lead], nan=0.0, posinf=1.0
         ).max()

@@ -173,7 +173,7 @@ class CycledPath:
             solves, cycles = self._solves(row, law, float(factors[row]))
             if not len(solves):
                 return Retarded(np.array([*a, begin]), np.array([*blocks, blocks[-1]]), _BREAKS)
-            grown = march(
+            integration = march(
                 law,
                 model,
                 self.order,
@@ -186,13 +186,13 @@ class CycledPath:
                 threshold=self.threshold,
                 blocks=limit - blocks[-1],
             )
-            zones = grown.zones
-            a.append(begin + grown.reached)
-            blocks.append(blocks[-1] + float(grown.cycles[-1]))
-            if grown.reached < (end - begin) * (1 - _ROUND_OFF):
-                over = blocks[-1] >= limit * (1 - _ROUND_OFF)
-                ended = f"max_blocks = {limit:.6g} reached" if over else _STANDS
-                return Retarded(np.array(a), np.array(blocks), ended)
+            zones = integration.zones
+            a.append(begin + integration.reached)
+            blocks.append(blocks[-1] + float(integration.cycles[-1]))
+            if integration.reached < (end - begin) * (1 - _ROUND_OFF):
+                is_at_limit = blocks[-1] >= limit * (1 - _ROUND_OFF)
+                why_ended = f"max_blocks = {limit:.6g} reached" if is_at_limit else _STANDS
+                return Retarded(np.array(a), np.array(blocks), why_ended)
         return Retarded(np.array(a), np.array(blocks))
 
     def _solves(self, row: int, law: Law, factor: float) -> tuple[Ints, BlockCycles]:
@@ -317,16 +317,16 @@ class RetardedLives:
         """Blocks with nothing varied."""
         return self._blocks(self.path.grown(self.law, self.model, self.limit))
 
-    def lives(self, drawn: Samples, n: int) -> Floats:
+    def lives(self, samples: Samples, n: int) -> Floats:
         """Blocks of each sample `(n,)`; inf for those that do not end."""
-        names = [name for name in drawn if name not in ("C", "K", "load")]
-        stretch = np.broadcast_to(stretch_of(drawn), n)
-        C = np.broadcast_to(drawn.get("C", np.ones(1)), n)
+        names = [name for name in samples if name not in ("C", "K", "load")]
+        stretch = np.broadcast_to(stretch_of(samples), n)
+        C = np.broadcast_to(samples.get("C", np.ones(1)), n)
         N = np.empty(n)
         for k in range(n):
-            law = varied_law(self.law, {name: float(drawn[name][k]) for name in names})
-            grown = self.path.grown(_times(law, float(C[k])), self.model, self.limit, stretch[k])
-            N[k] = self._blocks(grown)
+            law = varied_law(self.law, {name: float(samples[name][k]) for name in names})
+            path = self.path.grown(_times(law, float(C[k])), self.model, self.limit, stretch[k])
+            N[k] = self._blocks(path)
         return N
 
     def of_K(self) -> float:
@@ -338,8 +338,8 @@ class RetardedLives:
             for s in (-1.0, 1.0)
         )  # fmt: skip
 
-    def _blocks(self, grown: Retarded) -> float:
-        return grown.life if grown.broken else float("inf")
+    def _blocks(self, path: Retarded) -> float:
+        return path.life if path.broken else float("inf")
 
 
 def _times(law: Law, factor: float) -> Law:
@@ -351,8 +351,8 @@ def _times(law: Law, factor: float) -> Law:
     return result
 
 
-def _scaled_K(law: Law, factor: float, *given: Any, **named: Any) -> Floats:
-    return np.asarray(factor * law(*given, **named))
+def _scaled_K(law: Law, factor: float, *ranges: Any, **constants: Any) -> Floats:
+    return np.asarray(factor * law(*ranges, **constants))
 
 
 __all__ = ["CycledPath", "Retarded", "RetardedLives", "check", "retarded"]

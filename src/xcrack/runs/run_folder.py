@@ -107,15 +107,15 @@ def _header(content: Any, path: Path) -> RunHeader:
     KeyError, TypeError, ValueError
         It is not a file of a run.
     """
-    written = content["format"]
-    if written < FORMAT:
+    version = content["format"]
+    if version < FORMAT:
         raise ProblemError(
-            f"{path} has format {written}, from before the first release, and this xcrack reads "
+            f"{path} has format {version}, from before the first release, and this xcrack reads "
             f"{FORMAT}: start the run again in another folder."
         )
-    if written > FORMAT:
+    if version > FORMAT:
         raise ProblemError(
-            f"{path} was written by a newer xcrack (format {written}, this one reads {FORMAT}): "
+            f"{path} was written by a newer xcrack (format {version}, this one reads {FORMAT}): "
             "update xcrack, or read the run with the version that wrote it."
         )
     settings, versions = ({**content[key]} for key in ("settings", "versions"))
@@ -193,10 +193,12 @@ def write_step(folder: Path, step: Step, header: RunHeader) -> None:
     try:
         write_whole(path, packed_arrays(content))
     except OSError as error:
-        before = f"The {step.index} steps before it are whole" if step.index else "No step is there"
+        state_of_folder = (
+            f"The {step.index} steps before it are whole" if step.index else "No step is there"
+        )
         raise ProblemError(
-            f"step {step.index} cannot be written to {path}: {error.strerror or error}. {before}: "
-            "mend that and go on by resume."
+            f"step {step.index} cannot be written to {path}: {error.strerror or error}. "
+            f"{state_of_folder}: mend that and go on by resume."
         ) from error
 
 
@@ -229,9 +231,11 @@ def _read(path: Path) -> tuple[RunHeader | None, Step | None]:
         arrays = read_arrays(path.read_bytes())
     if arrays is None:
         return None, None
-    old = "Step" in str(arrays.get("tree", ""))  # the text of all older formats
+    is_old_format = "Step" in str(arrays.get("tree", ""))  # the text of all older formats
     try:
-        header = _header({"format": 2} if old else json.loads(str(arrays.pop("run"))), path)
+        header = _header(
+            {"format": 2} if is_old_format else json.loads(str(arrays.pop("run"))), path
+        )
     except (ValueError, KeyError, TypeError):
         return None, None
     try:
@@ -249,15 +253,15 @@ def move_aside(folder: Path, files: Sequence[Path]) -> Path:
     with system_errors("files cannot be moved aside in", folder, error=ProblemError):
         number = 1
         while True:
-            aside = folder / f"moved_aside_{number}"
+            new_folder = folder / f"moved_aside_{number}"
             try:
-                aside.mkdir()
+                new_folder.mkdir()
                 break
             except FileExistsError:
                 number += 1
         for path in files:
-            path.rename(aside / path.name)
-    return aside
+            path.rename(new_folder / path.name)
+    return new_folder
 
 
 def sweep(folder: Path) -> None:
@@ -294,11 +298,11 @@ class RunStore:
             self.mesh = mesh
         write_step(self.folder, step, self.header)
 
-    def end(self, ended: str) -> None:
+    def end(self, end: str) -> None:
         """Write why the run ended."""
         if self.header is not None:
             self.check()
-            write_header(self.folder, replace(self.header, ended=ended))
+            write_header(self.folder, replace(self.header, ended=end))
 
 
 def _make_room(folder: Path) -> None:
@@ -308,8 +312,8 @@ def _make_room(folder: Path) -> None:
     if header.exists() and (files or not _is_header(folder)):
         files.append(header)
     if files:
-        aside = move_aside(folder, files)
-        warn(f"{len(files)} files that stood in {folder} were moved to {aside}.")
+        new_folder = move_aside(folder, files)
+        warn(f"{len(files)} files that stood in {folder} were moved to {new_folder}.")
 
 
 def _is_header(folder: Path) -> bool:

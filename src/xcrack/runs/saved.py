@@ -185,12 +185,12 @@ def stored_condition(condition: Any) -> Any:
     return replace(condition, **changes) if changes else condition
 
 
-def _stored_state(acting: LoadState) -> LoadState:
-    return replace(acting, loads=tuple(map(stored_condition, acting.loads)))
+def _stored_state(load_state: LoadState) -> LoadState:
+    return replace(load_state, loads=tuple(map(stored_condition, load_state.loads)))
 
 
 def _content(result: Any) -> dict[str, Any]:
-    several = not isinstance(result, Solution)
+    has_several = not isinstance(result, Solution)
     solutions = list(result) if isinstance(result, list | tuple) else [result]
     if not solutions or not all(isinstance(solution, Solution) for solution in solutions):
         raise ProblemError(
@@ -200,7 +200,7 @@ def _content(result: Any) -> dict[str, Any]:
         raise ProblemError("save: the solutions are of different solves: save each on its own.")
     first = solutions[0]
     return {
-        "several": several,
+        "several": has_several,
         "problem": _problem_for_file(first.problem),
         "reuse": first.reuse.without_matrices(),
         "states": [_state(solution) for solution in solutions],
@@ -225,14 +225,14 @@ def _stored_material(problem: Problem) -> Material:
     elasticity, mesh = problem.elasticity, problem.mesh
     if elasticity.node_moduli is None:
         return elasticity.material
-    stored = {}
+    stored_materials = {}
     for k, (name, one) in enumerate(elasticity.named):
         cells = np.arange(len(mesh.cells))
         cells = cells[elasticity.set_number == k] if len(elasticity.set_number) else cells
         values = np.full(mesh.n_points + len(mesh.edges), np.nan)
         values[mesh.corners_and_edges[cells]] = elasticity.node_moduli[cells]
-        stored[name] = one.stored(lock(values))
-    return stored[""] if "" in stored else MaterialSets(stored)
+        stored_materials[name] = one.stored(lock(values))
+    return stored_materials[""] if "" in stored_materials else MaterialSets(stored_materials)
 
 
 def _state(solution: Solution) -> dict[str, Any]:

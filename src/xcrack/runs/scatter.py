@@ -175,7 +175,7 @@ class Scatter:
                 f"Scatter: correlation = {value_text(self.correlation)}: give a dict, "
                 '{("C", "m"): -0.98}.'
             )
-        checked = {}
+        correlations = {}
         for pair, value in self.correlation.items():
             names = pair if isinstance(pair, tuple) else ()
             if len(names) != 2 or not all(n in self.parts for n in names) or names[0] == names[1]:
@@ -189,13 +189,13 @@ class Scatter:
                     f"Scatter: correlation of {names[0]} and {names[1]} = {rho:g}: give it in "
                     "[-1, 1]."
                 )
-            checked[pair] = rho
-        object.__setattr__(self, "correlation", checked)
-        least = np.linalg.eigvalsh(self.matrix).min()
-        if least < -_ROUND_OFF:
+            correlations[pair] = rho
+        object.__setattr__(self, "correlation", correlations)
+        least_eigenvalue = np.linalg.eigvalsh(self.matrix).min()
+        if least_eigenvalue < -_ROUND_OFF:
             raise ProblemError(
                 "Scatter: no sample has these correlations together, their matrix has the "
-                f"eigenvalue {least:.3g}: give those of one covariance."
+                f"eigenvalue {least_eigenvalue:.3g}: give those of one covariance."
             )
 
     @property
@@ -268,7 +268,7 @@ _NODES = 257  # factors on K at which the rate of a block of many cycles is aske
 Samples = Mapping[str, Floats]
 
 
-def lives(lead: DrivingForce, law: Law | None, drawn: Samples, n: int) -> Floats:
+def lives(lead: DrivingForce, law: Law | None, samples: Samples, n: int) -> Floats:
     """Cycles of each sample `(n,)`, from the begin of the run.
 
     Parameters
@@ -277,12 +277,12 @@ def lives(lead: DrivingForce, law: Law | None, drawn: Samples, n: int) -> Floats
         The driving places alone.
     law : callable or None
         Of the run; None where only C and a0 vary.
-    drawn : dict of (n,) arrays
+    samples : dict of (n,) arrays
         Factors C, K and load, lengths a0, factors on constants of the law.
     n : int
     """
-    constants = {name: v for name, v in drawn.items() if name not in ("C", "K", "load", "a0")}
-    stretch, size = stretch_of(drawn), drawn.get("a0")
+    constants = {name: v for name, v in samples.items() if name not in ("C", "K", "load", "a0")}
+    stretch, size = stretch_of(samples), samples.get("a0")
     rates: _Stored | _Varied | _Tabulated | _Stretched
     if law is None or (len(stretch) == 1 and not constants and stretch[0] == 1):
         rates = _Stored(lead)
@@ -292,19 +292,19 @@ def lives(lead: DrivingForce, law: Law | None, drawn: Samples, n: int) -> Floats
         rates = _Tabulated(lead, law, stretch)
     else:
         rates = _Stretched(lead, law, stretch)
-    alike = isinstance(rates, _Stored) and size is None
-    count = 1 if alike else n
+    is_one_sample = isinstance(rates, _Stored) and size is None
+    count = 1 if is_one_sample else n
     N, rows = np.empty(count), max(1, _CHUNK // rates.work)
     for begin in range(0, count, rows):
         part = slice(begin, min(begin + rows, count))
         rate = rates.of(part)
         N[part] = _cycles_by_rates(lead, rate, None if size is None else size[part])
-    return np.broadcast_to(N / drawn.get("C", np.ones(1)), (n,)).copy()
+    return np.broadcast_to(N / samples.get("C", np.ones(1)), (n,)).copy()
 
 
-def stretch_of(drawn: Samples) -> Floats:
+def stretch_of(samples: Samples) -> Floats:
     """Factor on all K of each sample, or one for all."""
-    return np.asarray(drawn.get("K", np.ones(1)) * drawn.get("load", np.ones(1)))
+    return np.asarray(samples.get("K", np.ones(1)) * samples.get("load", np.ones(1)))
 
 
 def varied_law(law: Law, factors: Mapping[str, float]) -> Law:
@@ -322,18 +322,20 @@ def varied_law(law: Law, factors: Mapping[str, float]) -> Law:
 
 
 def _law_with_factor(part: Any, names: list[str], factor: float, whole_name: str, law: Law) -> Any:
-    has = is_dataclass(part) and names[0] in {field.name for field in fields(part)}
-    value = getattr(part, names[0]) if has else None
-    if has and len(names) > 1:
+    has_constant = is_dataclass(part) and names[0] in {field.name for field in fields(part)}
+    value = getattr(part, names[0]) if has_constant else None
+    if has_constant and len(names) > 1:
         inner = _law_with_factor(value, names[1:], factor, whole_name, law)
         return replace(part, **{names[0]: inner})
-    if not has or isinstance(value, bool) or not isinstance(value, int | float):
-        allowed: list[str] = []
+    if not has_constant or isinstance(value, bool) or not isinstance(value, int | float):
+        constant_names: list[str] = []
         if is_dataclass(law):
-            allowed = [f.name for f in fields(law) if isinstance(getattr(law, f.name), float)]
+            constant_names = [
+                f.name for f in fields(law) if isinstance(getattr(law, f.name), float)
+            ]
         raise ProblemError(
             f"life: {type(law).__name__} has no constant {whole_name!r} that can vary: give one of "
-            f"{', '.join(allowed) or 'a law of xcrack'}."
+            f"{', '.join(constant_names) or 'a law of xcrack'}."
         )
     try:
         return replace(part, **{names[0]: value * factor})
@@ -404,9 +406,9 @@ class _Tabulated:
             return self.table
         at = (self.log[part] if len(self.log) > 1 else self.log) - self.nodes[0]
         at = at / (self.nodes[1] - self.nodes[0])
-        left = np.clip(at.astype(np.int64), 0, len(self.nodes) - 2)
-        share = (at - left)[:, None, None]
-        low, high = self.table[left], self.table[left + 1]
+        node = np.clip(at.astype(np.int64), 0, len(self.nodes) - 2)
+        share = (at - node)[:, None, None]
+        low, high = self.table[node], self.table[node + 1]
         both = (low > 0) & np.isfinite(high) & (high > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             power = low * (high / low) ** share
@@ -417,13 +419,15 @@ class _Tabulated:
 def _cycles_by_rates(lead: DrivingForce, rate: Floats, size: Floats | None) -> Floats:
     """Cycles over all steps by some rates, in proportion to those that the run counted."""
     a = np.broadcast_to(lead.a, rate.shape)
-    counted = lead.cycles / cycles_of(lead.a, lead.rate)
+    blocks = lead.cycles / cycles_of(lead.a, lead.rate)
     if size is not None:
         a, rate = _steps_from_size(a, rate, size)
-    since = cycles_of(a, rate) * counted
-    broken = np.isinf(rate[..., 0]) | np.isinf(rate[..., 1])
-    later = np.cumsum(broken, axis=-1) - broken > 0  # steps after the toughness was reached
-    return np.asarray(np.where(later, 0.0, since).sum(axis=-1))
+    since = cycles_of(a, rate) * blocks
+    is_broken = np.isinf(rate[..., 0]) | np.isinf(rate[..., 1])
+    is_after_break = (
+        np.cumsum(is_broken, axis=-1) - is_broken > 0
+    )  # steps after the toughness was reached
+    return np.asarray(np.where(is_after_break, 0.0, since).sum(axis=-1))
 
 
 def _steps_from_size(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Floats]:

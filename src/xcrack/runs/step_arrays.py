@@ -240,11 +240,11 @@ def _or_nan(every: Sequence[Sequence[SIF]], part: Any) -> Floats:
     rows = []
     for row in every:
         values = [part(sif) for sif in row]
-        filled = [
+        columns = [
             np.full_like(sif.K, np.nan) if value is None else value
             for sif, value in zip(row, values, strict=True)
         ]
-        rows.append(np.concatenate(filled))
+        rows.append(np.concatenate(columns))
     return np.stack(rows)
 
 
@@ -288,11 +288,11 @@ def _unpack_sif(arrays: Arrays, n_cracks: int) -> tuple[tuple[SIF, ...], ...]:
 def _pack_reuse(state: SolverState) -> Arrays:
     result: Arrays = {"reuse_levels": np.array(state.levels, dtype=np.float64)}
     result["reuse_count"] = np.array([len(state.centre), len(state.slip)])
-    for c, (centre, active) in enumerate(zip(state.centre, state.active, strict=True)):
+    for c, (centre, closed_sets) in enumerate(zip(state.centre, state.active, strict=True)):
         if centre is not None:
             result[f"reuse_centre_{c}"] = centre
-        if active is not None:
-            result[f"reuse_closed_{c}"] = active
+        if closed_sets is not None:
+            result[f"reuse_closed_{c}"] = closed_sets
     for c, slip in enumerate(state.slip):
         result |= pack(f"reuse_slip_{c}", slip)
     return result
@@ -300,12 +300,14 @@ def _pack_reuse(state: SolverState) -> Arrays:
 
 def _unpack_reuse(arrays: Arrays) -> SolverState:
     n_cracks, n_slip = arrays["reuse_count"].tolist()
-    centre, active = (
+    centre, closed_sets = (
         tuple(arrays.get(f"reuse_{name}_{c}") for c in range(n_cracks))
         for name in ("centre", "closed")
     )
     slip = tuple(unpack(SlipField, f"reuse_slip_{c}", arrays) for c in range(n_slip))
-    return SolverState(centre, active, levels=tuple(arrays["reuse_levels"].tolist()), slip=slip)
+    return SolverState(
+        centre, closed_sets, levels=tuple(arrays["reuse_levels"].tolist()), slip=slip
+    )
 
 
 # A step.
@@ -386,7 +388,9 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
         An array is missing.
     """
     cracks = unpack_cracks("crack", arrays)
-    corrected = unpack_cracks("corrected", arrays) if "corrected_points" in arrays else cracks
+    corrected_cracks = (
+        unpack_cracks("corrected", arrays) if "corrected_points" in arrays else cracks
+    )
     sif = _unpack_sif(arrays, len(cracks))
     counts = np.bincount(arrays.get("crack", np.zeros(0, dtype=np.int64)), minlength=len(cracks))
 
@@ -402,7 +406,7 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
             Plan,
             "plan",
             arrays,
-            cracks=unpack_cracks("plan", arrays) if "plan_points" in arrays else corrected,
+            cracks=unpack_cracks("plan", arrays) if "plan_points" in arrays else corrected_cracks,
             apart=unpack_cracks("apart", arrays) if "apart_points" in arrays else (),
             joins=tuple(unpack_rows(Join, "plan_join", arrays)),
         )
@@ -432,7 +436,7 @@ def step_of(arrays: Arrays, settings: dict[str, str] | None = None) -> Step:
         sif=sif,
         **of_stations,
         levels=tuple(arrays["levels"].tolist()),
-        corrected=corrected,
+        corrected=corrected_cracks,
         error=error,
         warnings=tuple(arrays["warnings"].tolist()) if "warnings" in arrays else None,
         arrivals=tuple(unpack_rows(Arrival, "arrival", arrays)),

@@ -163,12 +163,14 @@ def _decode(tree: Any, arrays: Mapping[str, NDArray[Any]], classes: Classes, pat
     values = {key: decode_item(item) for key, item in tree["fields"].items()}
     make: Any = classes[name]
     fields_of_class = {f.name: f for f in fields(make) if f.init}
-    needed = {n for n, f in fields_of_class.items() if f.default is f.default_factory is MISSING}
-    odd = sorted((set(values) - set(fields_of_class)) | (needed - set(values)))
-    if odd:
+    required_names = {
+        n for n, f in fields_of_class.items() if f.default is f.default_factory is MISSING
+    }
+    odd_names = sorted((set(values) - set(fields_of_class)) | (required_names - set(values)))
+    if odd_names:
         raise UnknownValueError(
-            f"{path} holds a {name} that differs in {', '.join(odd)} from the one of this xcrack: "
-            "read it with the version that wrote it."
+            f"{path} holds a {name} that differs in {', '.join(odd_names)} from the one of this "
+            "xcrack: read it with the version that wrote it."
         )
     return make(**values)
 

@@ -43,8 +43,8 @@ class Table(np.ndarray[Any, Any]):
         columns = [self._by_number(name) for name in keys]
         for name in columns:
             if name not in (names or ()):
-                listed = ", ".join(names or ())
-                raise ProblemError(f"the table has no column {name!r}: it has {listed}.")
+                name_list = ", ".join(names or ())
+                raise ProblemError(f"the table has no column {name!r}: it has {name_list}.")
         if columns:
             key = columns[0] if isinstance(key, str) else columns
         result = super().__getitem__(key)
@@ -93,8 +93,8 @@ def _K_of_states(step: Step, states: Sequence[str], c: int, modes: int) -> list[
 
 def crack_numbers(step: Step) -> tuple[int, ...]:
     """Number that each crack of a step had at first."""
-    known = step.identities
-    return tuple(range(len(step.cracks))) if known is None else known.cracks
+    identities = step.identities
+    return tuple(range(len(step.cracks))) if identities is None else identities.cracks
 
 
 def end_id(step: Step, crack: int, number: int) -> int:
@@ -166,10 +166,10 @@ def _rows_3d(step: Step, states: Sequence[str], columns: Columns) -> list[tuple[
         sif = step.sif[0][c]
         every = [*_K_of_states(step, states, c, 3), *(of(step, c) for of in columns.values())]
         for number in np.unique(sif.front).tolist():
-            along = np.nonzero(sif.front == number)[0]
-            weight = front_weights(sif.x[along])
-            ends = [end for values in every for end in _extremes_and_mean(values[along], weight)]
-            middle, size, end = weight @ sif.x[along], _size(step, c), end_id(step, c, number)
+            places = np.nonzero(sif.front == number)[0]
+            weight = front_weights(sif.x[places])
+            ends = [end for values in every for end in _extremes_and_mean(values[places], weight)]
+            middle, size, end = weight @ sif.x[places], _size(step, c), end_id(step, c, number)
             rows.append((step.index, step.cycles, c, number, end, *middle, size, *ends))
     return rows
 
@@ -226,8 +226,8 @@ def _parts(steps: Sequence[Step]) -> Columns:
         result["R_low"] = lambda step, c: step.R_range[c][:, 0]
         result["R_high"] = lambda step, c: step.R_range[c][:, 1]
     for name in _VALIDITY:
-        known = [getattr(step.validity, name, np.nan) for step in steps]
-        if np.isfinite(known).any():
+        values = [getattr(step.validity, name, np.nan) for step in steps]
+        if np.isfinite(values).any():
             result[_VALIDITY[name]] = _of_validity(name)
     if any(step.load_factor != 1 for step in steps):
         result["load_factor"] = lambda step, c: np.full(len(step.R[c]), step.load_factor)
@@ -253,10 +253,10 @@ def _size(step: Step, c: int) -> float:
 
 def _extremes_and_mean(values: Floats, weight: Floats) -> tuple[float, float, float]:
     """Smallest value, mean and largest; points without a value do not count."""
-    good = np.isfinite(values)
-    if not good.any():
+    is_finite = np.isfinite(values)
+    if not is_finite.any():
         return np.nan, np.nan, np.nan
-    good_values, share = values[good], weight[good]
+    good_values, share = values[is_finite], weight[is_finite]
     total = float(share.sum())
     mean = float(share @ good_values) / total if total else float(good_values.mean())
     return float(good_values.min()), mean, float(good_values.max())
@@ -462,15 +462,15 @@ def fracture_loads(steps: Sequence[Step], K_c: float) -> NDArray[Any]:
     ------
     ProblemError
     """
-    solved = [step for step in steps if not step.has_left]
-    if not solved or not all(step.solutions for step in solved):
+    solved_steps = [step for step in steps if not step.has_left]
+    if not solved_steps or not all(step.solutions for step in solved_steps):
         raise ProblemError(
             "load_at: the steps have no solutions, as those of a run read from its folder: call it "
             "on what collect returned."
         )
-    check_in_proportion(solved, driving_forces(steps), "load_at")
+    check_in_proportion(solved_steps, driving_forces(steps), "load_at")
     rows = []
-    for step in solved:
+    for step in solved_steps:
         pairs = zip(step.dK_eq, step.R, strict=True)
         K = [float((dK / (1.0 - R)).max()) for dK, R in pairs if len(dK)]
         factor = K_c / max(K)

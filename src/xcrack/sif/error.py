@@ -143,7 +143,7 @@ def _contributions_near(solution: Solution, result: Estimate, x: Floats) -> Floa
     if not len(x):
         return np.zeros_like(result.eta)
     is_near = _cells_near(solution, x)
-    every = [shares(result.surplus, parts, together=True)[is_near] for parts in result.parts]
+    every = [shares(result.surplus, parts, is_total=True)[is_near] for parts in result.parts]
     return np.asarray(np.sum(every, axis=1))
 
 

@@ -158,9 +158,9 @@ class SIF:
             raise ProblemError(f"SIF: x has the shape {x.shape}: give (n, 2) or (n, 3).")
         numbers(self.frame, "SIF: frame", (n, d, d))
         for name in ("K", "spread"):
-            numbers(getattr(self, name), f"SIF: {name}", (n, d), finite=False)
+            numbers(getattr(self, name), f"SIF: {name}", (n, d), must_be_finite=False)
         for name in ("T", "s", "domain_cells"):
-            numbers(getattr(self, name), f"SIF: {name}", (n,), finite=False)
+            numbers(getattr(self, name), f"SIF: {name}", (n,), must_be_finite=False)
         whole_numbers(self.front, "SIF: front", (n,))
         for name in ("at_surface", "closed"):
             flags = getattr(self, name)
@@ -170,7 +170,7 @@ class SIF:
                 )
         for name, shape in (("widened", (n, d)), ("E_prime", (n,)), ("nu", (n,))):
             if getattr(self, name) is not None:
-                numbers(getattr(self, name), f"SIF: {name}", shape, finite=False)
+                numbers(getattr(self, name), f"SIF: {name}", shape, must_be_finite=False)
         if self.errors is not None and not isinstance(self.errors, KErrors):
             raise ProblemError(f"SIF: errors = {value_text(self.errors)}: give KErrors or None.")
         known = isinstance(self.ends, tuple)

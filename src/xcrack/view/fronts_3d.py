@@ -250,22 +250,22 @@ def front_axes(
     if mesh is None:
         axes.add_collection(LineCollection(list(edges), colors="0.7", linewidths=0.8))
     body = None if mesh is None else Body.of(mesh)
-    single = len(runs) == 1
+    is_single = len(runs) == 1
     last = max(steps[-1].index for steps in runs)
     colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
     for k, (steps, name) in enumerate(zip(runs, labels, strict=True)):
         every_step = list(zip(steps, _numbers_of(steps, crack)))
         for step, numbers in [*every_step[:-1:every], every_step[-1]]:
-            newest = step is steps[-1]
+            is_last = step is steps[-1]
             age = (last - step.index) / max(last, 1)
-            color = colours(scale(step.index)) if single else f"C{k}"
+            color = colours(scale(step.index)) if is_single else f"C{k}"
             for x in (x for c in numbers for x in _drawn_lines(step, c, body)):
                 axes.plot(
                     *on_plane(x, view).T,
                     ("-", "--", "-.", ":")[k % 4],
                     color=color,
-                    lw=2.0 if newest else 1.1,
-                    alpha=1.0 if single else 1.0 - 0.65 * age,
+                    lw=2.0 if is_last else 1.1,
+                    alpha=1.0 if is_single else 1.0 - 0.65 * age,
                 )
         if name:
             axes.plot([], [], ("-", "--", "-.", ":")[k % 4], color=f"C{k}", label=name)
@@ -273,7 +273,7 @@ def front_axes(
     axes.autoscale_view()
     axes.set(xlabel=view.label(0), ylabel=view.label(1))
     axes.spines[["top", "right"]].set_visible(False)
-    if single and len(runs[0]) > 1:
+    if is_single and len(runs[0]) > 1:
         bar = ScalarMappable(scale, colours)
         integer_ticks = MaxNLocator(integer=True)
         axes.figure.colorbar(bar, ax=axes, label="step", shrink=0.8, aspect=25, ticks=integer_ticks)
@@ -294,11 +294,11 @@ def _numbers_of(steps: Sequence[Step], crack: int) -> list[list[int]]:
         for one, other in zip(steps, steps[1:])
     ]
     last = crack
-    for after in number:
-        last = after[last]
+    for next_numbers in number:
+        last = next_numbers[last]
     rows = [[last]]
-    for after in reversed(number):
-        rows.append([c for c, now in enumerate(after) if now in rows[-1]])
+    for next_numbers in reversed(number):
+        rows.append([c for c, next_number in enumerate(next_numbers) if next_number in rows[-1]])
     return rows[::-1]
 
 
@@ -315,21 +315,21 @@ def step_fronts(step: Step, crack: int) -> list[FrontLine]:
     list of FrontLine
     """
     body = step.cracks[crack]
-    closed = closed_fronts(body)
+    is_closed_front = closed_fronts(body)
     lines = []
-    evaluated = step.sif[0][crack] if step.sif else None
-    if evaluated is not None and len(evaluated.x):
-        for number in np.unique(evaluated.front):
-            x = evaluated.x[evaluated.front == number]
+    sif = step.sif[0][crack] if step.sif else None
+    if sif is not None and len(sif.x):
+        for number in np.unique(sif.front):
+            x = sif.x[sif.front == number]
             # A closed front that leaves the body in part has K on the rest of it.
-            is_loop = (number >= len(closed) or closed[number]) and is_closed(x)
+            is_loop = (number >= len(is_closed_front) or is_closed_front[number]) and is_closed(x)
             lines.append(
                 FrontLine(np.concatenate([x, x[:1]]) if is_loop else x, is_loop, int(number))
             )
         return lines
     return [
         FrontLine(body.points[front], is_loop, k)
-        for k, (front, is_loop) in enumerate(zip(body.fronts or (), closed, strict=True))
+        for k, (front, is_loop) in enumerate(zip(body.fronts or (), is_closed_front, strict=True))
     ]
 
 

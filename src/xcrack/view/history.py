@@ -44,8 +44,8 @@ def _draw_K(history: History, axes: Any) -> None:
     for number, end in enumerate(np.unique(table["id"][table["step"] == table["step"][0]])):
         rows, label = table[table["id"] == end], _end_name(history, int(end))
         every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in states])
-        severe = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
-        K_I, K_II = every[severe, :, np.arange(len(rows))].T
+        severe_state = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
+        K_I, K_II = every[severe_state, :, np.arange(len(rows))].T
         axes.plot(rows["a"], K_I, "o-", ms=3, color=f"C{number}", label=f"$K_I$, {label}")
         axes.plot(rows["a"], K_II, "s--", ms=3, color=f"C{number}", label=f"$K_{{II}}$, {label}")
     axes.set(xlabel="crack length a", ylabel="K of the most severe state")
@@ -60,7 +60,7 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
         rows, label = table[table["id"] == end], _end_name(history, int(end))
         for mode, style in (("I", "o-"), ("II", "s--"), ("III", "^:")):
             states = state_names(history.steps)
-            low, high = (_extreme_K(rows, states, mode, most) for most in ("min", "max"))
+            low, high = (_extreme_K(rows, states, mode, extreme) for extreme in ("min", "max"))
             # The sign of modes II and III goes round with the front.
             largest = high if mode == "I" else np.maximum(np.abs(low), np.abs(high))
             name = f"$K_I$, {label}" if mode == "I" else f"$|K_{{{mode}}}|$, {label}"
@@ -76,14 +76,18 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
     axes.legend(fontsize="small")
 
 
-def _extreme_K(rows: Any, states: list[str], mode: str, most: str) -> Any:
+def _extreme_K(rows: Any, states: list[str], mode: str, extreme: str) -> Any:
     """Smallest or largest K of a mode in the state whose K is largest in size `(k,)`."""
     ends = [
         np.array([[rows[f"K_{m}_{s}_{e}"] for e in ("min", "max")] for m in ("I", "II", "III")])
         for s in states
     ]
-    severe = np.argmax([np.nan_to_num(np.abs(each)).max(axis=(0, 1)) for each in ends], axis=0)
-    return np.array([rows[f"K_{mode}_{states[s]}_{most}"][k] for k, s in enumerate(severe)])
+    severe_state = np.argmax(
+        [np.nan_to_num(np.abs(each)).max(axis=(0, 1)) for each in ends], axis=0
+    )
+    return np.array(
+        [rows[f"K_{mode}_{states[s]}_{extreme}"][k] for k, s in enumerate(severe_state)]
+    )
 
 
 def _draw_fronts(history: History, axes: Any) -> None:
@@ -111,18 +115,18 @@ def _draw_measures(history: History, axes: Any) -> None:
     rows["crack"] = _crack_of_rows(history, rows)
     lengths = [name for name in rows.dtype.names or () if name.startswith("length_")]
     for crack in np.unique(rows["crack"]):
-        rows_of_crack, who = rows[rows["crack"] == crack], f"crack {crack}: "
+        rows_of_crack, prefix = rows[rows["crack"] == crack], f"crack {crack}: "
         axes.plot(
             rows_of_crack["N"],
             rows_of_crack["depth"],
             "o-",
             ms=3,
             color=f"C{crack}",
-            label=who + "depth",
+            label=prefix + "depth",
         )
         for name, style in zip(lengths, "sv^Dx<>P*" * len(lengths)):
             if np.nanmax(np.append(rows_of_crack[name], 0.0)) > 0:
-                label = f"{who}length on {name.removeprefix('length_')}"
+                label = f"{prefix}length on {name.removeprefix('length_')}"
                 axes.plot(
                     rows_of_crack["N"],
                     rows_of_crack[name],

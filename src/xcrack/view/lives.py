@@ -96,16 +96,18 @@ def plot_strength(
     N = strength["N"]
     axes.plot(N, strength["factor"], color="0.75", lw=6, zorder=1, label="residual strength")
     for number, name in enumerate(CRITERIA):
-        shown = np.where(np.isfinite(strength[name]), strength[name], np.nan)
-        if np.isfinite(shown).any():
-            axes.plot(N, shown, "o-", ms=3, lw=1.2, color=f"C{number}", label=_LABELS[name])
+        finite_strength = np.where(np.isfinite(strength[name]), strength[name], np.nan)
+        if np.isfinite(finite_strength).any():
+            axes.plot(
+                N, finite_strength, "o-", ms=3, lw=1.2, color=f"C{number}", label=_LABELS[name]
+            )
     axes.axhline(1.0, color="k", lw=1, ls="--", label="largest load of the run")
     for n in np.nonzero(np.diff(strength["crack"]))[0]:
         words = f"crack {strength['crack'][n + 1]} leads"
         axes.axvline(N[n + 1], color="0.5", lw=0.8, ls=":", label=words)
-    finite = strength["factor"][np.isfinite(strength["factor"])]
+    finite_factors = strength["factor"][np.isfinite(strength["factor"])]
     axes.set(xlabel=f"{unit}s N", ylabel="factor on the largest load",
-             ylim=(0, max(1.2, 1.35 * float(finite.max()))))  # fmt: skip
+             ylim=(0, max(1.2, 1.35 * float(finite_factors.max()))))  # fmt: skip
     axes.legend(fontsize="small")
     finish_figure(figure, target, target is None)
     return figure
@@ -264,9 +266,9 @@ def _curves(laws: Mapping[str, Any], ranges: Any, R: float, a: float) -> dict[st
         except ProblemError as error:
             reasons.append(str(error))
             continue
-        good = np.isfinite(rate) & (rate > 0)
-        if good.any():
-            curves[name] = np.where(good, rate, np.nan)
+        is_good = np.isfinite(rate) & (rate > 0)
+        if is_good.any():
+            curves[name] = np.where(is_good, rate, np.nan)
     if not curves:
         hint = f" ({reasons[0]})" if reasons else ""
         raise ProblemError(
@@ -286,19 +288,21 @@ def draw_sweep(
 ) -> None:
     """Draw a column of a study over its first key; cases that failed are left out."""
     key, others = keys[0], keys[1:]
-    good = np.isfinite(rows[result])
+    is_good = np.isfinite(rows[result])
     figure = new_figure((6.4, 4.8), False, "sweep")
     axes = figure.add_subplot()
     lines: dict[tuple[Any, ...], list[int]] = {}
-    for n in np.nonzero(good)[0].tolist():
+    for n in np.nonzero(is_good)[0].tolist():
         lines.setdefault(tuple(rows[name][n] for name in others), []).append(n)
     for values, line in lines.items():
         label = ", ".join(f"{name} = {_text(v)}" for name, v in zip(others, values, strict=True))
         axes.plot(_places(rows[key][line]), rows[result][line], "o-", ms=4, label=label or None)
     if others and len(lines) <= _NAMED:
         axes.legend(fontsize="small")
-    failed = int((~good).sum())
-    words = f"{result} of {title}" + (f"; {failed} of {len(rows)} cases failed" if failed else "")
+    n_failed = int((~is_good).sum())
+    words = f"{result} of {title}" + (
+        f"; {n_failed} of {len(rows)} cases failed" if n_failed else ""
+    )
     axes.set(xlabel=key, ylabel=result)
     axes.set_title(words, fontsize="medium")
     axes.grid(True, alpha=0.3)

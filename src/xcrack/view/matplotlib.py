@@ -28,7 +28,7 @@ def draw(
     figure, axes = _body_axes(picture.box, show, bar=1.5)
     from matplotlib.collections import LineCollection
 
-    mapped = axes.tripcolor(
+    artist = axes.tripcolor(
         *picture.points.T,
         picture.triangles,
         picture.values,
@@ -58,7 +58,7 @@ def draw(
         _legend_below(axes, 1)
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max"}
     figure.colorbar(
-        mapped,
+        artist,
         ax=axes,
         label=picture.label,
         extend=extend.get(picture.is_beyond, "both"),
@@ -93,13 +93,13 @@ def draw_mesh(
     )
     rim = boundary_lines(mesh)
     axes.add_collection(LineCollection(list(rim), colors="black", linewidths=0.9))
-    carries = [number >= 0 for number in space.heaviside]
-    if carries:
-        x = space.node_points[np.any(carries, axis=0)]
+    has_jump = [number >= 0 for number in space.heaviside]
+    if has_jump:
+        x = space.node_points[np.any(has_jump, axis=0)]
         axes.plot(*x.T, "s", ms=3.2, mfc="none", mec="C0", mew=0.8, label="Heaviside", zorder=3)
-    around = [tip.point_to_function >= 0 for tip in space.tips]
-    if around:
-        x = mesh.points[np.any(around, axis=0)]
+    has_tip = [tip.point_to_function >= 0 for tip in space.tips]
+    if has_tip:
+        x = mesh.points[np.any(has_tip, axis=0)]
         axes.plot(*x.T, "o", ms=4.6, mfc="none", mec="C1", mew=0.8, label="tip functions", zorder=3)
     for c, cut in enumerate(space.cuts):
         axes.add_collection(
@@ -158,8 +158,8 @@ def _draw_along(axes: Any, solution: Solution, field: str, c: int) -> None:
     if field == "pressure":
         curves = [("contact pressure p", lips.pressure, "C0", "-")]
     else:
-        along = np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)
-        slip = np.einsum("qd,qd->q", lips.jump, along)
+        tangents = np.stack([lips.normal[:, 1], -lips.normal[:, 0]], axis=1)
+        slip = np.einsum("qd,qd->q", lips.jump, tangents)
         curves = [
             ("opening n·⟦u⟧", np.einsum("qd,qd->q", lips.jump, lips.normal), "C0", "-"),
             ("sliding t·⟦u⟧", slip, "C1", "--"),
@@ -202,9 +202,9 @@ def _draw_along(axes: Any, solution: Solution, field: str, c: int) -> None:
     axes.legend(fontsize="small", loc="best")
 
 
-def _closed_parts(closed: np.ndarray, s: Floats) -> list[tuple[float, float]]:
+def _closed_parts(is_closed: np.ndarray, s: Floats) -> list[tuple[float, float]]:
     """Stretches of s on which the crack faces touch, up to half way to the next open point."""
-    change = np.diff(np.concatenate([[0], closed.astype(np.int64), [0]]))
+    change = np.diff(np.concatenate([[0], is_closed.astype(np.int64), [0]]))
     begin, end = np.nonzero(change > 0)[0], np.nonzero(change < 0)[0] - 1
     middle = np.concatenate([s[:1], (s[1:] + s[:-1]) / 2, s[-1:]])
     return [(float(middle[a]), float(middle[b + 1])) for a, b in zip(begin, end, strict=True)]
@@ -284,8 +284,8 @@ def draw_cracks(
         low, high = limits
     colours = cmap or ("RdBu_r" if low < 0 < high else "viridis")
     for axes, each, plane, c in zip(every, lips, planes, cracks, strict=True):
-        meets = junction_lines(solution, c)
-        _map(figure, axes, each, meets, plane, field, (low, high), colours)
+        junctions = junction_lines(solution, c)
+        _map(figure, axes, each, junctions, plane, field, (low, high), colours)
         if len(solution.lips) > 1:
             axes.set_title(f"crack {c}", fontsize="medium", loc="left")
     if title:
@@ -297,7 +297,7 @@ def _map(
     figure: Any,
     axes: Any,
     lips: LipFaces,
-    meets: list[tuple[LipFaces, Ints]],
+    junctions: list[tuple[LipFaces, Ints]],
     plane: Projection,
     field: str,
     limits: tuple[float, float],
@@ -310,7 +310,7 @@ def _map(
     # Shading mixes colours, not values: in small triangles that is nearly the same.
     part = _parts(_FINER)
     corners = np.einsum("pwv,tvd->tpwd", part, x[lips.triangles]).reshape(-1, 2)
-    mapped = axes.tripcolor(
+    artist = axes.tripcolor(
         *corners.T,
         np.arange(len(corners)).reshape(-1, 3),
         np.einsum("pwv,tv->tpw", part, values).ravel(),
@@ -320,17 +320,17 @@ def _map(
         vmax=limits[1],
         rasterized=True,
     )
-    marked = ~is_coloured(lips, field)
+    is_marked = ~is_coloured(lips, field)
     color, label = (
         ("#c9ccd1", "crack faces apart") if field == "pressure" else (CLOSED, "crack faces touch")
     )
-    if marked.any():
-        parts: list[Floats] = list(x[lips.triangles[marked]])
+    if is_marked.any():
+        parts: list[Floats] = list(x[lips.triangles[is_marked]])
         axes.add_collection(
             PolyCollection(parts, facecolors=color, edgecolors=color, linewidths=0.3)
         )
         axes.plot([], [], "s", color=color, label=label)
-    junction = [on_plane(other.points, plane)[edges] for other, edges in meets]
+    junction = [on_plane(other.points, plane)[edges] for other, edges in junctions]
     for segments, line, width, name in (
         (x[lips.mouth], "black", 1.2, "mouth"),
         (np.concatenate([np.zeros((0, 2, 2)), *junction]), "#7b3294", 1.8, "junction"),
@@ -345,7 +345,7 @@ def _map(
     axes.legend(
         fontsize="small", frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4
     )
-    figure.colorbar(mapped, ax=axes, label=LIP_FIELDS[field], shrink=0.9, aspect=18)
+    figure.colorbar(artist, ax=axes, label=LIP_FIELDS[field], shrink=0.9, aspect=18)
 
 
 def _parts(n: int) -> Floats:

@@ -170,9 +170,9 @@ class PlotStyle:
     loads: bool
     near: Floats | None
 
-    def colours(self, signed: bool) -> Any:
+    def colours(self, is_signed: bool) -> Any:
         """The colour map, or one that suits the values."""
-        return self.cmap or ("RdBu_r" if signed else "viridis")
+        return self.cmap or ("RdBu_r" if is_signed else "viridis")
 
     def cracks(self, solution: Solution) -> list[int]:
         """The cracks to draw."""
@@ -292,18 +292,18 @@ def crack_box(solution: Solution, cracks: list[int], zoom: float, warp: float = 
     return np.stack([middle - half, middle + half])
 
 
-def _solution_to_draw(given: Solution | Problem, field: str) -> Solution:
+def _solution_to_draw(source: Solution | Problem, field: str) -> Solution:
     """The solution, or that of a problem in which nothing acts, to draw its mesh and cracks."""
-    if isinstance(given, Solution):
-        return given
+    if isinstance(source, Solution):
+        return source
     if field != "mesh":
         raise ProblemError(
             f"plot: a Problem has no field {value_text(field)}: give what solve returns, or "
             'field="mesh".'
         )
-    space, lips = discretise(given)
+    space, lips = discretise(source)
     return Solution(
-        problem=given,
+        problem=source,
         state=None,
         acting=scaled_state((), 0.0),
         space=space,

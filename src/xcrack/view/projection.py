@@ -55,11 +55,11 @@ def given_plane(
         origin, axes = value
         x, two = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
         lengths = np.linalg.norm(two, axis=1, keepdims=True)
-        right, second = two / np.where((lengths > 0) & np.isfinite(lengths), lengths, np.inf)
-        up = second - (second @ right) * right
+        right_axis, second = two / np.where((lengths > 0) & np.isfinite(lengths), lengths, np.inf)
+        up = second - (second @ right_axis) * right_axis
         length = float(np.linalg.norm(up))
-        if length > 1e-6 and right.any():
-            return Projection(lock(np.array(x)), lock(np.stack([right, up / length])))
+        if length > 1e-6 and right_axis.any():
+            return Projection(lock(np.array(x)), lock(np.stack([right_axis, up / length])))
         reason = "the two directions are parallel, or one is zero"
     except (TypeError, ValueError):
         reason = "that is no pair"
@@ -86,22 +86,22 @@ def best_plane(x: Floats, normal: ArrayLike | None = None) -> Projection:
     """
     middle = x.mean(axis=0)
     n = np.linalg.svd(x - middle, full_matrices=False)[2][-1]
-    toward = np.asarray([1.0, -1.1, 1.2] if normal is None else normal)
-    n = n if n @ toward >= 0 else -n
+    viewer = np.asarray([1.0, -1.1, 1.2] if normal is None else normal)
+    n = n if n @ viewer >= 0 else -n
     axis = int(np.argmax(np.abs(n)))
     if abs(n[axis]) > _AXIS:
         # Seen along an axis: x to the right or y, and the usual letters up.
-        right, up = np.eye(3)[[(1, 0, 0)[axis], (2, 2, 1)[axis]]]
-        right = right if np.cross(right, up) @ n > 0 else -right
+        right_axis, up = np.eye(3)[[(1, 0, 0)[axis], (2, 2, 1)[axis]]]
+        right_axis = right_axis if np.cross(right_axis, up) @ n > 0 else -right_axis
         origin = np.where(np.arange(3) == axis, middle, 0.0)
-        return Projection(lock(origin), lock(np.stack([right, up])))
-    upright = np.eye(3)[1 if abs(n[2]) > 0.9 else 2]
-    right = np.cross(upright, n)
-    right /= np.linalg.norm(right)
-    two = np.stack([right, np.cross(n, right)])
+        return Projection(lock(origin), lock(np.stack([right_axis, up])))
+    up_axis = np.eye(3)[1 if abs(n[2]) > 0.9 else 2]
+    right_axis = np.cross(up_axis, n)
+    right_axis /= np.linalg.norm(right_axis)
+    two = np.stack([right_axis, np.cross(n, right_axis)])
     # A direction along an axis shows the coordinate itself.
-    along = np.abs(two).max(axis=1) > _AXIS
-    return Projection(lock(middle - (along * (two @ middle)) @ two), lock(two))
+    is_in_plane = np.abs(two).max(axis=1) > _AXIS
+    return Projection(lock(middle - (is_in_plane * (two @ middle)) @ two), lock(two))
 
 
 def on_plane(x: Floats, plane: Projection) -> Floats:
@@ -118,8 +118,8 @@ def section_outline(mesh: Mesh, plane: Projection) -> Floats:
     bary, parent = interface_simplices(level[rows])
     rows = rows[parent]
     lines = np.einsum("kwv,kvd->kwd", bary, mesh.points[facets[rows]])
-    if (curved := CurvedSides.of(mesh)) is not None:
-        lines = curved.bent(lines, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows])
+    if (curved_sides := CurvedSides.of(mesh)) is not None:
+        lines = curved_sides.bent(lines, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows])
     return on_plane(lines, plane)
 
 

@@ -195,9 +195,9 @@ def _ticks(low: float, high: float) -> Floats:
     >>> _ticks(-0.3, 1.0).round(3).tolist()
     [-0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
     """
-    rough = (high - low) / 7
-    unit = 10.0 ** np.floor(np.log10(rough))
-    step = unit * next(k for k in (1, 2, 5, 10) if k * unit >= rough * (1 - 1e-9))
+    raw_step = (high - low) / 7
+    unit = 10.0 ** np.floor(np.log10(raw_step))
+    step = unit * next(k for k in (1, 2, 5, 10) if k * unit >= raw_step * (1 - 1e-9))
     first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
     return np.asarray(step * np.arange(first, last + 1) + 0.0)  # + 0.0: no "-0"
 
@@ -207,12 +207,12 @@ def quiet_vtk() -> Iterator[None]:
     """Without VTK's remark that it found no display and draws without one."""
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    before = vtkLogger.GetCurrentVerbosityCutoff()
+    earlier_cutoff = vtkLogger.GetCurrentVerbosityCutoff()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)
     try:
         yield
     finally:
-        vtkLogger.SetStderrVerbosity(before)
+        vtkLogger.SetStderrVerbosity(earlier_cutoff)
 
 
 def font_size(pixels: int) -> int:
@@ -252,18 +252,18 @@ def draw_space(
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
     pv = require_package("pyvista", 'plot(renderer="pyvista")')
-    right, up, toward = _axes(picture.view_direction)
+    right_axis, up, viewer = _axes(picture.view_direction)
     box = picture.box if arrows is None else picture.body
     if arrows is not None:
         box = np.concatenate([box, arrows[0], arrows[0] + arrows[1]])
-    flat = box @ np.stack([right, up, toward], axis=1)
-    low, high = flat.min(axis=0), flat.max(axis=0)
+    corners_in_view = box @ np.stack([right_axis, up, viewer], axis=1)
+    low, high = corners_in_view.min(axis=0), corners_in_view.max(axis=0)
     size = high - low
     extent = float(size[:2].max())
     scale = LONGER / extent
-    if float((picture.body @ right).max()) > high[0]:
+    if float((picture.body @ right_axis).max()) > high[0]:
         # What lies beyond the box would be drawn under the bar of the colours.
-        picture = _left_of(picture, right, float(high[0]) + MARGIN / scale)
+        picture = _left_of(picture, right_axis, float(high[0]) + MARGIN / scale)
     top = 70 if title else 0
     bar = BAR if picture.label or _legend(picture) else _TRIAD
     width = max(int(size[0] * scale) + 2 * MARGIN, SHORTEST) + bar
@@ -276,8 +276,8 @@ def draw_space(
             # See-through surfaces have to be sorted by depth, or they hide each other.
             plotter.enable_depth_peeling(10)
         _add_faces(pv, plotter, picture, cmap, (width, height), top + _TRIAD)
-        _add_space_lines(pv, plotter, picture, edges, toward * 2e-3 * extent)
-        _add_points(plotter, picture, toward * 3e-3 * extent)
+        _add_space_lines(pv, plotter, picture, edges, viewer * 2e-3 * extent)
+        _add_points(plotter, picture, viewer * 3e-3 * extent)
         if arrows is not None:
             _add_arrows(pv, plotter, arrows)
         _add_legend(plotter, picture, (width, height))
@@ -288,10 +288,10 @@ def draw_space(
         x = (low[0] + high[0]) / 2 + bar / 2 / scale
         y = (low[1] + high[1]) / 2 + top / 2 / scale
         # From close by, too, the whole body lies before the camera.
-        depth = picture.body @ toward
+        depth = picture.body @ viewer
         far_distance = extent + float(depth.max() - depth.min())
-        middle = x * right + y * up + (depth.min() + depth.max()) / 2 * toward
-        camera.focal_point, camera.position = tuple(middle), tuple(middle + far_distance * toward)
+        middle = x * right_axis + y * up + (depth.min() + depth.max()) / 2 * viewer
+        camera.focal_point, camera.position = tuple(middle), tuple(middle + far_distance * viewer)
         camera.up = tuple(up)
         camera.parallel_scale = height / 2 / scale
         camera.clipping_range = (0.01 * far_distance, 2.5 * far_distance)
@@ -300,31 +300,31 @@ def draw_space(
         return show_or_save(plotter, file, show)
 
 
-def _axes(toward: Floats) -> tuple[Floats, Floats, Floats]:
+def _axes(viewer: Floats) -> tuple[Floats, Floats, Floats]:
     """Unit vectors right, up (along z if that can be seen) and towards the viewer."""
-    upright = np.array([0.0, 0.0, 1.0] if abs(toward[2]) < 0.98 else [0.0, 1.0, 0.0])
-    right = np.cross(upright, toward)
-    right /= np.linalg.norm(right)
-    return right, np.cross(toward, right), toward
+    world_up = np.array([0.0, 0.0, 1.0] if abs(viewer[2]) < 0.98 else [0.0, 1.0, 0.0])
+    right_axis = np.cross(world_up, viewer)
+    right_axis /= np.linalg.norm(right_axis)
+    return right_axis, np.cross(viewer, right_axis), viewer
 
 
-def _left_of(picture: SpaceScene, right: Floats, limit: float) -> SpaceScene:
+def _left_of(picture: SpaceScene, right_axis: Floats, limit: float) -> SpaceScene:
     """A picture without what lies beyond a limit on the right."""
 
     def cut(corners: Floats, values: Floats | None = None) -> tuple[Floats, Floats]:
         k, v = corners.shape[:2]
         number = np.arange(k * v).reshape(k, v)
         x = corners.reshape(-1, 3)
-        level = x @ right - limit
+        level = x @ right_axis - limit
         parts = (
             [TriangleSoup.of(number, None).behind(level)]
             if v > 2
             else segments_behind(number, level)
         )
-        shown = np.zeros(k * v) if values is None else values.ravel()
+        data = np.zeros(k * v) if values is None else values.ravel()
         return (
             np.concatenate([part.at(x) for part in parts]),
-            np.concatenate([part.at(shown[:, None])[..., 0] for part in parts]),
+            np.concatenate([part.at(data[:, None])[..., 0] for part in parts]),
         )
 
     names = (

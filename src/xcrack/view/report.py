@@ -101,7 +101,7 @@ def report(
     for words in scene.plastic_zone(source)[1]:
         warn(words)
         source.warnings.update([words])
-    sections = [made for make in SECTIONS if (made := make(source)) is not None]
+    sections = [section for make in SECTIONS if (section := make(source)) is not None]
     texts = {path: _page(source, sections), path.with_suffix(".json"): _json(source, sections)}
     write_texts(texts, "the report cannot be written to", error=ProblemError)
     return path
@@ -109,17 +109,17 @@ def report(
 
 def pictures(source: Source) -> Section:
     """Pictures; why some are missing is said."""
-    drawn, missing = solution_pictures(source.solutions, source.sif)
+    figures, messages = solution_pictures(source.solutions, source.sif)
     if source.history is not None:
-        of_run, lost = history_pictures(source.history)
-        drawn, missing = drawn + of_run, missing + lost
-    parts: list[Any] = [figure_markup(picture) for picture in drawn]
-    if missing:
-        parts += [element("p", "Not drawn here:", cls="soft"), list_markup(missing)]
+        of_run, messages_of_run = history_pictures(source.history)
+        figures, messages = figures + of_run, messages + messages_of_run
+    parts: list[Any] = [figure_markup(picture) for picture in figures]
+    if messages:
+        parts += [element("p", "Not drawn here:", cls="soft"), list_markup(messages)]
     if not parts:
         parts.append(element("p", "There is nothing to draw yet."))
     return Section("pictures", "Pictures", join_parts(*parts),
-                   {"drawn": [words for words, _ in drawn], "missing": missing})  # fmt: skip
+                   {"drawn": [words for words, _ in figures], "missing": messages})  # fmt: skip
 
 
 def space_view(source: Source) -> Section | None:
@@ -165,11 +165,11 @@ SECTIONS: Sequence[Callable[[Source], Section | None]] = (
 
 
 def _page(source: Source, sections: Sequence[Section]) -> str:
-    today = datetime.date.today().isoformat()
+    date = datetime.date.today().isoformat()
     links = Markup(" ".join(f'<a href="#{s.key}">{s.title}</a>' for s in sections))
     parts: list[Any] = [
         element("h1", source.title),
-        element("p", f"xcrack {versions()['xcrack']} · {today}", cls="soft"),
+        element("p", f"xcrack {versions()['xcrack']} · {date}", cls="soft"),
     ]
     if not source.is_whole:
         words = "This run is not finished; the report shows what is there."

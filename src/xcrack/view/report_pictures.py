@@ -28,16 +28,16 @@ def solution_pictures(
     """Pictures of the states of one solve, and why some could not be drawn."""
     if not solutions:
         return [], []
-    severe = solutions[_most_severe(solutions, sif)]
+    severe_solution = solutions[_most_severe(solutions, sif)]
     drawers: list[tuple[str, Draw]] = [
-        ("Mesh, cracks and enriched points", lambda f: plot(severe, "mesh", file=f)),
-        ("Equivalent stress, displacements enlarged", _field(severe, "von_mises")),
+        ("Mesh, cracks and enriched points", lambda f: plot(severe_solution, "mesh", file=f)),
+        ("Equivalent stress, displacements enlarged", _field(severe_solution, "von_mises")),
     ]
     for k, solution in enumerate(solutions):
         if any(contact is not None and contact.closed.any() for contact in solution.contact):
             drawers.append((f"Contact pressure, state {k}", _field(solution, "pressure", 0.0)))
-    if severe.lips:
-        drawers.append(("Opening of the crack faces", _field(severe, "opening", 0.0)))
+    if severe_solution.lips:
+        drawers.append(("Opening of the crack faces", _field(severe_solution, "opening", 0.0)))
     drawers += list(_along_fronts(sif))
     return _drawn_picture(drawers)
 
@@ -45,15 +45,17 @@ def solution_pictures(
 def figure_markup(picture: Picture) -> Markup:
     """A picture with the words under it, as part of a page."""
     words, data = picture
-    coded = base64.b64encode(data).decode()
+    encoded_data = base64.b64encode(data).decode()
     text = element("figcaption", words)
-    return Markup(f'<figure><img alt="{words}" src="data:image/png;base64,{coded}">{text}</figure>')
+    return Markup(
+        f'<figure><img alt="{words}" src="data:image/png;base64,{encoded_data}">{text}</figure>'
+    )
 
 
 def drawn_figure(words: str, draw: Draw) -> Markup:
     """A picture as part of a page; words where it cannot be drawn here."""
-    drawn, missing = _drawn_picture([(words, draw)])
-    return figure_markup(drawn[0]) if drawn else element("p", missing[0], cls="soft")
+    images, messages = _drawn_picture([(words, draw)])
+    return figure_markup(images[0]) if images else element("p", messages[0], cls="soft")
 
 
 def first_picture(
@@ -64,8 +66,10 @@ def first_picture(
         return drawn_figure("Length of the cracks over the life", lambda f: history.plot("a", f))
     if not solutions:
         return None
-    severe = solutions[_most_severe(solutions, sif)]
-    return drawn_figure("Equivalent stress, displacements enlarged", _field(severe, "von_mises"))
+    severe_solution = solutions[_most_severe(solutions, sif)]
+    return drawn_figure(
+        "Equivalent stress, displacements enlarged", _field(severe_solution, "von_mises")
+    )
 
 
 def history_pictures(history: History) -> tuple[list[Picture], list[str]]:
@@ -79,8 +83,8 @@ def history_pictures(history: History) -> tuple[list[Picture], list[str]]:
         ("Rate of growth over the range", lambda f: _rates(history, f)),
     ]
     if history.mesh is not None:
-        measured = "Depth and surface lengths over cycles"
-        drawers.insert(3, (measured, lambda f: history.plot("measures", f)))
+        title_of_measures = "Depth and surface lengths over cycles"
+        drawers.insert(3, (title_of_measures, lambda f: history.plot("measures", f)))
     return _drawn_picture(drawers)
 
 
@@ -92,10 +96,10 @@ def _field(solution: Solution, field: str, warp: float | None = None) -> Draw:
 def _warp(solution: Solution) -> float:
     """A factor that makes displacements a twentieth of the body, in round numbers."""
     mesh = solution.space.mesh
-    moved = float(np.abs(solution.coefficients[: mesh.n_points]).max(initial=0.0))
-    if moved <= 0:
+    displacement = float(np.abs(solution.coefficients[: mesh.n_points]).max(initial=0.0))
+    if displacement <= 0:
         return 0.0
-    factor = 0.05 * mesh.extent / moved
+    factor = 0.05 * mesh.extent / displacement
     power = 10.0 ** np.floor(np.log10(factor))
     return float(power * max(m for m in (1, 2, 5) if m * power <= factor))
 
@@ -135,9 +139,9 @@ def _rates(history: History, file: Path) -> None:
     for c in range(len(history.cracks)):
         pairs = [(step.dK_eq[c], step.rate[c]) for step in history.steps if c < len(step.rate)]
         x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
-        good = (x > 0) & (y > 0) & np.isfinite(y)
-        if good.any():
-            axes.loglog(x[good], y[good], ".", ms=5, color=f"C{c}", label=f"crack {c}")
+        is_good = (x > 0) & (y > 0) & np.isfinite(y)
+        if is_good.any():
+            axes.loglog(x[is_good], y[is_good], ".", ms=5, color=f"C{c}", label=f"crack {c}")
     axes.set(xlabel="equivalent range ΔK", ylabel="da/dN")
     axes.grid(True, which="both", alpha=0.3)
     if axes.get_legend_handles_labels()[0]:
@@ -146,7 +150,7 @@ def _rates(history: History, file: Path) -> None:
 
 
 def _drawn_picture(drawers: Sequence[tuple[str, Draw]]) -> tuple[list[Picture], list[str]]:
-    pictures, missing = [], []
+    pictures, messages = [], []
     with tempfile.TemporaryDirectory() as folder:
         for k, (words, draw) in enumerate(drawers):
             file = Path(folder) / f"{k}.png"
@@ -154,8 +158,8 @@ def _drawn_picture(drawers: Sequence[tuple[str, Draw]]) -> tuple[list[Picture], 
                 draw(file)
                 pictures.append((words, file.read_bytes()))
             except (XcrackError, OSError) as error:
-                missing.append(f"{words}: {str(error).splitlines()[0]}")
-    return pictures, missing
+                messages.append(f"{words}: {str(error).splitlines()[0]}")
+    return pictures, messages
 
 
 __all__ = [

@@ -46,9 +46,9 @@ def intensity(source: Source) -> Section | None:
         note += f" No bars: {'; '.join(sorted(reasons))}."
     names = (*first, *(_K_head(name, source.units) for name in head))
     known_columns = [k for k in range(len(names)) if any(not _is_nan(row[k]) for row in rows)]
-    shown = [[row[k] for k in known_columns] for row in rows]
+    cells = [[row[k] for k in known_columns] for row in rows]
     is_long = len(rows) > 12 or source.dim > 2
-    content = join_parts(table([names[k] for k in known_columns], shown, scroll=is_long),
+    content = join_parts(table([names[k] for k in known_columns], cells, scroll=is_long),
                      element("p", note, cls="soft"))  # fmt: skip
     return Section("K", "Stress intensity factors", content, {"rows": numbers})
 
@@ -74,24 +74,24 @@ def _row(sif: SIF, is_of_tip: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any
 
 
 def _at_tip(sif: SIF, is_of_tip: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
-    K, closed = sif.K[is_of_tip][0], bool(sif.closed[is_of_tip].any())
+    K, is_closed = sif.K[is_of_tip][0], bool(sif.closed[is_of_tip].any())
     best, bar = sif.best[is_of_tip][0], sif.bar[is_of_tip][0]
     place = coordinates(sif.x[is_of_tip][0])
     head = ("place", "K_I", "K_II", "T", "best K_I", "± K_I", "best K_II", "± K_II", "spread",
             "domain", "closed")  # fmt: skip
     bars = (best[0], bar[0], best[1], bar[1])
-    return head, (place, K[0], K[1], sif.T[is_of_tip][0], *bars, *quality, closed)
+    return head, (place, K[0], K[1], sif.T[is_of_tip][0], *bars, *quality, is_closed)
 
 
 def _along_front(sif: SIF, is_of_tip: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
-    K, closed = sif.K[is_of_tip], int(sif.closed[is_of_tip].sum())
+    K, n_closed = sif.K[is_of_tip], int(sif.closed[is_of_tip].sum())
     head = ("places", *(f"{mode} {end}" for mode in _MODES for end in ("min", "mean", "max")),
             "largest ± K_I", "± K_II", "± K_III", "spread", "domain",
             "closed places")  # fmt: skip
     bar = sif.bar[is_of_tip]
     bars = [float(np.nanmax(column)) if np.isfinite(column).any() else np.nan for column in bar.T]
     ends = [f(K[:, m]) for m in range(3) for f in (np.min, np.mean, np.max)]
-    return head, (int(is_of_tip.sum()), *map(float, ends), *bars, *quality, closed)
+    return head, (int(is_of_tip.sum()), *map(float, ends), *bars, *quality, n_closed)
 
 
 _ROW = {2: _at_tip, 3: _along_front}
@@ -118,37 +118,43 @@ def _friction_values(solution: Solution, contact: Contact | None) -> tuple[float
 def contact(source: Source) -> Section | None:
     """Share of each crack that is closed, largest pressure and opening."""
     rows = []
-    rubs = any(any(solution.problem.frictions) for solution in source.solutions)
+    has_friction = any(any(solution.problem.frictions) for solution in source.solutions)
     for k, solution in enumerate(source.solutions):
         for c, lips in enumerate(solution.lips):
-            gap, pressed = solution.opening(c), solution.contact[c]
+            gap, contact_of_crack = solution.opening(c), solution.contact[c]
             share, force, largest = 0.0, 0.0, 0.0
-            if pressed is not None:
-                total = float(pressed.measure.sum())
-                share = float(pressed.measure[pressed.closed].sum()) / total if total else 0.0
-                force = float(pressed.measure @ pressed.pressure)
-                largest = float(pressed.pressure.max(initial=0.0))
+            if contact_of_crack is not None:
+                total = float(contact_of_crack.measure.sum())
+                share = (
+                    float(contact_of_crack.measure[contact_of_crack.closed].sum()) / total
+                    if total
+                    else 0.0
+                )
+                force = float(contact_of_crack.measure @ contact_of_crack.pressure)
+                largest = float(contact_of_crack.pressure.max(initial=0.0))
             low = float(gap.min(initial=np.inf)) if len(lips) else 0.0
-            rows.append((k, solution.state, c, pressed is not None, share, largest, force,
+            rows.append((k, solution.state, c, contact_of_crack is not None, share, largest, force,
                          float(gap.max(initial=0.0)), low,
-                         *_friction_values(solution, pressed)))  # fmt: skip
+                         *_friction_values(solution, contact_of_crack)))  # fmt: skip
     if not rows:
         return None
     head = ("state", "load", "crack", "multipliers", "closed share", "largest pressure",
             "contact force", "largest opening", "smallest opening",
-            *(_RUBBED if rubs else ()))  # fmt: skip
-    shown = [(k, _load(state), *rest) for k, state, *rest in rows]
-    numbers = [{name: _json_value(v) for name, v in zip(head, row, strict=True)} for row in shown]
+            *(_RUBBED if has_friction else ()))  # fmt: skip
+    shown_rows = [(k, _load(state), *rest) for k, state, *rest in rows]
+    numbers = [
+        {name: _json_value(v) for name, v in zip(head, row, strict=True)} for row in shown_rows
+    ]
     stresses, lengths = {"largest pressure", "largest shear"}, {"largest slip"}
     units = source.units
-    printed = [
+    headings = [
         units.head(name, STRESS if name in stresses
                    else LENGTH if "opening" in name or name in lengths
                    else LINE_FORCE if name == "contact force" and source.dim == 2
                    else FORCE if name == "contact force" else NUMBER)
         for name in head
     ]  # fmt: skip
-    content = table(printed, shown)
+    content = table(headings, shown_rows)
     return Section("contact", "Contact of the crack faces", content, {"rows": numbers})
 
 
@@ -238,8 +244,10 @@ def numbers(source: Source) -> Section | None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
     writer.writerows(rows.tolist())
-    coded = base64.b64encode(text.getvalue().encode()).decode()
-    link = Markup(f'<a download="history.csv" href="data:text/csv;base64,{coded}">history.csv</a>')
+    text_of_file = base64.b64encode(text.getvalue().encode()).decode()
+    link = Markup(
+        f'<a download="history.csv" href="data:text/csv;base64,{text_of_file}">history.csv</a>'
+    )
     content = join_parts(element("p", join_parts("Save it as ", link)),
                      table([_column_head(name, source.units) for name in names], rows.tolist(),
                            scroll=True))  # fmt: skip
@@ -285,7 +293,7 @@ def spectrum(source: Source) -> Section | None:
         ("one repetition", unit),
         ("repetitions at the last step", last.cycles),
     ]
-    rows += _rows(settings, "cycle.", besides=("cycle.unit",))
+    rows += _rows(settings, "cycle.", other_keys=("cycle.unit",))
     counts = [len(step.levels) for step in steps if step.levels]
     if counts:
         levels = last.levels
@@ -293,10 +301,10 @@ def spectrum(source: Source) -> Section | None:
                  ("their factors", f"{min(levels):.6g} to {max(levels):.6g}"),
                  ("largest range", max(levels) - min(levels))]  # fmt: skip
     parts: list[Any] = [table((), rows)]
-    shown = source.spectrum
-    if shown is not None and shown.states is None:
-        words = f"Load history: a {shown.unit} in time, and how often a range is exceeded"
-        parts.append(drawn_figure(words, lambda file: plot_spectrum(shown, file=file)))
+    drawn_spectrum = source.spectrum
+    if drawn_spectrum is not None and drawn_spectrum.states is None:
+        words = f"Load history: a {drawn_spectrum.unit} in time, and how often a range is exceeded"
+        parts.append(drawn_figure(words, lambda file: plot_spectrum(drawn_spectrum, file=file)))
     values: dict[str, Any] = {"unit": unit, "blocks": last.cycles, "levels": list(last.levels)}
     model = settings.get("retardation", "None")
     if model != "None":
@@ -314,11 +322,11 @@ def spectrum(source: Source) -> Section | None:
     return Section("spectrum", "Load history", join_parts(*parts), values)
 
 
-def _rows(settings: Any, prefix: str, besides: tuple[str, ...] = ()) -> list[tuple[str, str]]:
+def _rows(settings: Any, prefix: str, other_keys: tuple[str, ...] = ()) -> list[tuple[str, str]]:
     return [
         (key.removeprefix(prefix), setting_words(text).partition(", sha256")[0])
         for key, text in settings.items()
-        if key.startswith(prefix) and key not in besides and text != "None"
+        if key.startswith(prefix) and key not in other_keys and text != "None"
     ]
 
 

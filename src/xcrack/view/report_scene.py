@@ -116,12 +116,12 @@ def condition_row(role: str, condition: Condition, units: UnitNames) -> tuple[st
     return role, condition.kind, place, values_in_words(condition, units)
 
 
-def values_in_words(given: Declared, units: UnitNames) -> str:
+def values_in_words(value: Declared, units: UnitNames) -> str:
     """Arguments of a value that are not left out, but for its place, with their units."""
     words = [
-        f"{name} = {_value(getattr(given, name))} {units.label(_unit(argument))}".rstrip()
-        for name, argument in arguments_of(type(given)).items()
-        if name != "where" and getattr(given, name) is not argument.default
+        f"{name} = {_value(getattr(value, name))} {units.label(_unit(argument))}".rstrip()
+        for name, argument in arguments_of(type(value)).items()
+        if name != "where" and getattr(value, name) is not argument.default
     ]
     return ", ".join(words)
 
@@ -169,8 +169,8 @@ def assumptions(source: Source) -> Section:
 
 
 def _notes(source: Source) -> list[str]:
-    rubs = any(any(solution.problem.frictions) for solution in source.solutions)
-    faces = "with Coulomb friction" if rubs else "without friction"
+    has_friction = any(any(solution.problem.frictions) for solution in source.solutions)
+    faces = "with Coulomb friction" if has_friction else "without friction"
     notes = [f"Small strains, a linear elastic isotropic body, crack faces {faces}."]
     notes.append(plastic_zone(source)[0])
     history = source.history
@@ -190,9 +190,9 @@ def _notes(source: Source) -> list[str]:
             notes.append(f"The loads change as the crack grows ({program}): their factor goes "
                          f"from {factors[0]:.4g} to {factors[-1]:.4g}, see load_factor in the "
                          "table of the run.")  # fmt: skip
-        touching = any(state[c].closed.any() for step in history.steps for state in step.sif
+        has_contact = any(state[c].closed.any() for step in history.steps for state in step.sif
                        for c in range(len(state)))  # fmt: skip
-        if "elber" in law and touching:
+        if "elber" in law and has_contact:
             notes.append("Closure may be counted twice: the law has a share U of the range, and "
                          "contact of the crack faces was computed too.")  # fmt: skip
     return notes
@@ -200,22 +200,22 @@ def _notes(source: Source) -> list[str]:
 
 def plastic_zone(source: Source) -> tuple[str, list[str]]:
     """Plastic zones against crack, ligament and cell in words, and what is beyond its limit."""
-    known = source.validity
-    if known is None or np.isnan(known.zone):
+    check = source.validity
+    if check is None or np.isnan(check.zone):
         words = ("Plastic zones and net sections were not judged: no yield stress is known. Give "
                  "Isotropic(..., yield_stress=...), or report(..., yield_stress=...).")  # fmt: skip
-        return words, [] if known is None else [str(alarm) for alarm in known.alarms()]
-    shares = {"crack": known.of_crack, "ligament ahead": known.of_ligament}
+        return words, [] if check is None else [str(alarm) for alarm in check.alarms()]
+    shares = {"crack": check.of_crack, "ligament ahead": check.of_ligament}
     if _cell(source) > 0:
-        shares["smallest cell"] = known.zone / _cell(source)
+        shares["smallest cell"] = check.zone / _cell(source)
     parts = ", ".join(f"{100 * share:.3g} % of the {of}" for of, share in shares.items()
                       if not np.isnan(share))  # fmt: skip
-    alarms = [str(alarm) for alarm in known.alarms()]
+    alarms = [str(alarm) for alarm in check.alarms()]
     verdict = "NOT small: linear elastic K does not hold" if alarms else "small"
-    words = (f"Plastic zone (Irwin, plane {known.state}) of {known.zone:.4g} for the largest K "
-             f"{known.K:.6g}: at most {parts}; {verdict}.")  # fmt: skip
-    if not np.isnan(known.of_section):
-        words += f" Net section: {100 * known.of_section:.3g} % of the load at which it yields."
+    words = (f"Plastic zone (Irwin, plane {check.state}) of {check.zone:.4g} for the largest K "
+             f"{check.K:.6g}: at most {parts}; {verdict}.")  # fmt: skip
+    if not np.isnan(check.of_section):
+        words += f" Net section: {100 * check.of_section:.3g} % of the load at which it yields."
     return words, alarms
 
 

@@ -170,9 +170,9 @@ class Source:
         problem, mesh = self.problem, self.mesh
         material: Material
         if problem is None and self.yield_stress is None and self.history is not None:
-            stored = self.history.solved[-1].validity if self.history.solved else None
-            if stored is not None:
-                return stored
+            validity_of_run = self.history.solved[-1].validity if self.history.solved else None
+            if validity_of_run is not None:
+                return validity_of_run
         if problem is not None:
             material, cracks = problem.elasticity.material, problem.placed
         elif self.history is not None and self.history.solved:  # the most severe of what it may be
@@ -245,7 +245,7 @@ def path_or_result(value: Any, what: str, error: type[XcrackError]) -> Any:
 
 
 def source_of(
-    given: Any, title: str, yield_stress: float | None, life: Life | None = None
+    results: Any, title: str, yield_stress: float | None, life: Life | None = None
 ) -> Source:
     """Gather what a report is about.
 
@@ -256,13 +256,13 @@ def source_of(
     """
     messages: list[str] = []
     with collected_warnings(messages):
-        if isinstance(given, Path):
-            title = title or given.name
-            given = load(given)
-        if isinstance(given, History):
-            source = _of_history(given, title, yield_stress)
+        if isinstance(results, Path):
+            title = title or results.name
+            results = load(results)
+        if isinstance(results, History):
+            source = _of_history(results, title, yield_stress)
         else:
-            solutions = _solutions(given)
+            solutions = _solutions(results)
             source = Source(title or "Solution", solutions, _sif(solutions), None, yield_stress)
     source.warnings.update(messages)
     if source.history is not None:
@@ -294,13 +294,13 @@ def _sif(solutions: Sequence[Solution]) -> tuple[tuple[SIF, ...], ...]:
     return tuple(tuple(by_crack[c][k] for c in range(n)) for k in range(len(solutions)))
 
 
-def _solutions(given: Any) -> tuple[Solution, ...]:
-    result = [given] if isinstance(given, Solution) else given
+def _solutions(source: Any) -> tuple[Solution, ...]:
+    result = [source] if isinstance(source, Solution) else source
     if isinstance(result, list | tuple) and result and all(isinstance(s, Solution) for s in result):
         return tuple(result)
     raise ProblemError(
         f"report takes a Solution or a list of them, a History, or the folder of a run, not a "
-        f"{type(given).__name__}."
+        f"{type(source).__name__}."
     )
 
 

@@ -31,11 +31,11 @@ def summary(source: Source) -> Section:
     words = Markup(f'<a href="#warnings">{_count_of(count, "warning")}</a>')
     rows.append(("warnings", element("span", words, cls="bad" if count else "good")))
     parts: list[Any] = [table((), rows)]
-    drawn = first_picture(source.history, source.solutions, source.sif)
-    if drawn is not None:
-        parts.append(drawn)
-    shown = {name: str(value) for name, value in rows if not isinstance(value, Markup)}
-    return Section("summary", "Summary", join_parts(*parts), {**shown, "warnings": count})
+    picture = first_picture(source.history, source.solutions, source.sif)
+    if picture is not None:
+        parts.append(picture)
+    texts = {name: str(value) for name, value in rows if not isinstance(value, Markup)}
+    return Section("summary", "Summary", join_parts(*parts), {**texts, "warnings": count})
 
 
 Rows = Iterator[tuple[str, Any]]
@@ -57,11 +57,11 @@ def _part(source: Source) -> Rows:
         if source.yield_stress is not None:
             words += f", judged by a yield stress of {units.value(source.yield_stress, STRESS)}"
         yield (f"material {name!r}" if name else "material"), words
-    given = [condition_row("load", load, units) for load in problem.loads]
-    for _, kind, place, value in given[:_MOST_LOADS]:
+    load_rows = [condition_row("load", load, units) for load in problem.loads]
+    for _, kind, place, value in load_rows[:_MOST_LOADS]:
         yield "load", ", ".join(part for part in (kind, place and f"at {place}", value) if part)
-    if len(given) > _MOST_LOADS:
-        yield "load", f"and {len(given) - _MOST_LOADS} more: see Scene"
+    if len(load_rows) > _MOST_LOADS:
+        yield "load", f"and {len(load_rows) - _MOST_LOADS} more: see Scene"
 
 
 def _cracks(source: Source) -> Rows:
@@ -69,10 +69,10 @@ def _cracks(source: Source) -> Rows:
     if history is not None and history.steps:
         yield from ((f"crack {c} at first", _size(crack, source))
                     for c, crack in enumerate(history.steps[0].cracks))  # fmt: skip
-    when = "" if history is None else " at the end"
+    time = "" if history is None else " at the end"
     if mesh is not None or source.dim == 3:
         for c, crack in enumerate(source.cracks):
-            yield f"crack {c}{when}", _size(crack, source)
+            yield f"crack {c}{time}", _size(crack, source)
 
 
 def _size(crack: Crack, source: Source) -> str:
@@ -140,8 +140,10 @@ def _margins(source: Source) -> Rows:
                     where = f", state {k}" if len(source.sif) > 1 else ""
                     yield f"K of crack {c}{where}", _largest_K(sif, source)
         last = np.nan if source.validity is None else source.validity.K
-    for known in () if source.problem is None or history is not None else source.problem.handbook:
-        yield "beside a handbook", known.comparison(source.solutions[-1])
+    for handbook_case in (
+        () if source.problem is None or history is not None else source.problem.handbook
+    ):
+        yield "beside a handbook", handbook_case.comparison(source.solutions[-1])
     K_c = source.toughness
     if K_c is not None and last > 0:
         yield "margin of toughness", _verdict(f"K_c / K = {K_c / last:.4g}", K_c > last)
@@ -174,18 +176,18 @@ def _decisions(source: Source) -> Rows:
     strength, plan, life = source.strength, source.inspection, source.life
     if strength is not None and len(strength):
         names = [name for name in CRITERIA if name in (strength.dtype.names or ())]
-        least = np.nanmin([strength[name] for name in names], axis=0)
+        least_factor = np.nanmin([strength[name] for name in names], axis=0)
         if "factor" in (strength.dtype.names or ()):
-            least = strength["factor"]
-        words = f"bears {least[-1]:.4g} times the largest load at the end"
-        yield "residual strength", _verdict(words, least.min() >= 1)
+            least_factor = strength["factor"]
+        words = f"bears {least_factor[-1]:.4g} times the largest load at the end"
+        yield "residual strength", _verdict(words, least_factor.min() >= 1)
     if life is not None:
-        early = life.percentile(100 * _FEW)
-        yield "life with scatter", f"{100 * _FEW:g} % end before {early:.5g} {life.unit}s"
+        early_life = life.percentile(100 * _FEW)
+        yield "life with scatter", f"{100 * _FEW:g} % end before {early_life:.5g} {life.unit}s"
     if plan is not None:
-        missed = "" if plan.missed is None else f"; all miss with chance {plan.missed:.3g}"
+        words_of_chance = "" if plan.missed is None else f"; all miss with chance {plan.missed:.3g}"
         yield "inspection", (f"first after {plan.first:.6g}, then every {plan.interval:.6g}: "
-                             f"{_count_of(len(plan.at), 'look')}{missed}")  # fmt: skip
+                             f"{_count_of(len(plan.at), 'look')}{words_of_chance}")  # fmt: skip
 
 
 # --- what keeps a crack from breaking the body: looks, and strength left ---
@@ -230,14 +232,14 @@ def strength(source: Source) -> Section | None:
     by = [name for name in names if name == "factor" or name.startswith("by_")]
     parts: list[Any] = []
     if by and len(rows):
-        least = np.nanmin([rows[name] for name in by], axis=0)
+        least_factor = np.nanmin([rows[name] for name in by], axis=0)
         if "factor" in names:
-            least = rows["factor"]
-        first = np.nonzero(least < 1)[0]
+            least_factor = rows["factor"]
+        first = np.nonzero(least_factor < 1)[0]
         words = (
             f"The largest load breaks the body from step {int(rows['step'][first[0]])} on."
             if len(first)
-            else f"At the last step the body bears {least[-1]:.4g} times the largest load."
+            else f"At the last step the body bears {least_factor[-1]:.4g} times the largest load."
         )
         parts.append(element("p", words, cls="bad" if len(first) else ""))
     if "factor" in names:

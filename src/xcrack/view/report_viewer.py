@@ -196,12 +196,12 @@ def _layer(name: str, kind: str, corners: Floats, colours: Any, opacity: float) 
 
 
 def _body(mesh: Mesh) -> list[dict[str, Any]]:
-    curved = CurvedSides.of(mesh)
-    pairs, facet, is_sharp = boundary_edges(mesh, curved)
+    curved_sides = CurvedSides.of(mesh)
+    pairs, facet, is_sharp = boundary_edges(mesh, curved_sides)
     skin, edges = mesh.points[mesh.boundary], mesh.points[pairs[is_sharp]]
-    if curved is not None:
-        skin = curved.bent(skin, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
-        edges = curved.bent(edges, facet[is_sharp])
+    if curved_sides is not None:
+        skin = curved_sides.bent(skin, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
+        edges = curved_sides.bent(edges, facet[is_sharp])
     return [
         _layer("body", "triangles", skin, _GREY, 0.25),
         _layer("edges", "lines", edges, _EDGE, 1.0),

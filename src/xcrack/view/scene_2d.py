@@ -92,28 +92,28 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
     label = label_of(body, field)
     label += f", clipped at {int(10 * share) / 10:g} %" if share < 100 else ""
     edge, owner = _edges(body)
-    crack, closed = _on_lips(body, edge)
+    crack, is_closed = _on_lips(body, edge)
     lip = crack >= 0
-    on_facet, facet, between = _on_facets(body, edge, owner)
+    on_facet, facet, is_between = _on_facets(body, edge, owner)
     rim = (facet >= 0) & ~lip
     points, triangles = body.points, _triangles(body)
-    given = np.concatenate([body.displacement, values[:, None]], axis=1)
-    curved = CurvedSides.of(solution.space.mesh)
+    data = np.concatenate([body.displacement, values[:, None]], axis=1)
+    curved_sides = CurvedSides.of(solution.space.mesh)
     rims = None
-    if curved is not None:
-        points, halves, of_half = _onto_curves(curved, points, edge[rim], facet[rim])
-        rims = curved.bend(points[halves], of_half, given[halves])
-        points, given, triangles = _curved_triangles(
-            curved, points, given, triangles, halves, of_half
+    if curved_sides is not None:
+        points, halves, of_half = _onto_curves(curved_sides, points, edge[rim], facet[rim])
+        rims = curved_sides.bend(points[halves], of_half, data[halves])
+        points, data, triangles = _curved_triangles(
+            curved_sides, points, data, triangles, halves, of_half
         )
-    moved, values = points + warp * given[:, :2], given[:, 2]
-    curve, rest = _curves(edge, moved), _curves(edge, points)[rim]
+    moved_points, values = points + warp * data[:, :2], data[:, 2]
+    curve, rest = _curves(edge, moved_points), _curves(edge, points)[rim]
     outline = curve[rim]
     if rims is not None:
         rest = _with_middles(rims[0])
         outline = _with_middles(rims[0] + warp * rims[1][..., :2])
     return Scene(
-        points=moved,
+        points=moved_points,
         triangles=triangles,
         values=values,
         label=label,
@@ -124,42 +124,54 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
         ),
         has_sign=low < 0 < high,
         outline=outline,
-        lips=curve[lip & ~closed],
-        closed_lips=curve[lip & closed],
+        lips=curve[lip & ~is_closed],
+        closed_lips=curve[lip & is_closed],
         cell_edges=curve[on_facet & ~lip & ~rim],
         at_rest=rest,
-        interfaces=curve[between & ~lip],
+        interfaces=curve[is_between & ~lip],
     )
 
 
 def _onto_curves(
-    curved: CurvedSides, points: Floats, edge: Ints, facet: Ints
+    curved_sides: CurvedSides, points: Floats, edge: Ints, facet: Ints
 ) -> tuple[Floats, Ints, Ints]:
     """Points with those of curved edges on their curves, and halves of all edges: ends, facet."""
-    x, bends = points.copy(), curved.facet_to_curve[facet] >= 0
+    x, bends = points.copy(), curved_sides.facet_to_curve[facet] >= 0
     number, first = np.unique(edge[bends], return_index=True)
     of_point = np.repeat(facet[bends], 3)[first]
-    x[number[number >= 0]] = curved.nearest(x[number[number >= 0]], of_point[number >= 0])
+    x[number[number >= 0]] = curved_sides.nearest(x[number[number >= 0]], of_point[number >= 0])
     a, b, middle = edge.T
-    has = middle >= 0
-    halves = [np.stack(pair, axis=1) for pair in ((a[~has], b[~has]), (a[has], middle[has]))]
-    halves.append(np.stack([middle[has], b[has]], axis=1))
-    return x, np.concatenate(halves), np.concatenate([facet[~has], facet[has], facet[has]])
+    has_middle = middle >= 0
+    halves = [
+        np.stack(pair, axis=1)
+        for pair in ((a[~has_middle], b[~has_middle]), (a[has_middle], middle[has_middle]))
+    ]
+    halves.append(np.stack([middle[has_middle], b[has_middle]], axis=1))
+    return (
+        x,
+        np.concatenate(halves),
+        np.concatenate([facet[~has_middle], facet[has_middle], facet[has_middle]]),
+    )
 
 
 def _curved_triangles(
-    curved: CurvedSides, points: Floats, given: Floats, triangles: Ints, lines: Ints, facet: Ints
+    curved_sides: CurvedSides,
+    points: Floats,
+    point_data: Floats,
+    triangles: Ints,
+    lines: Ints,
+    facet: Ints,
 ) -> tuple[Floats, Floats, Ints]:
     """Points, values and triangles, those beside a curved edge in parts that follow it."""
-    edges = curved.facets_of_edges(triangles, lines, facet)
-    beside = (edges >= 0).any(axis=1)
-    chosen = triangles[beside]
-    x, data = curved.bend_edges(points[chosen], edges[beside], given[chosen])
+    edges = curved_sides.facets_of_edges(triangles, lines, facet)
+    is_beside = (edges >= 0).any(axis=1)
+    chosen = triangles[is_beside]
+    x, data = curved_sides.bend_edges(points[chosen], edges[is_beside], point_data[chosen])
     number = len(points) + np.arange(3 * len(x)).reshape(-1, 3)
     return (
         np.concatenate([points, x.reshape(-1, 2)]),
-        np.concatenate([given, data.reshape(len(number) * 3, -1)]),
-        np.concatenate([triangles[~beside], number]),
+        np.concatenate([point_data, data.reshape(len(number) * 3, -1)]),
+        np.concatenate([triangles[~is_beside], number]),
     )
 
 
@@ -172,8 +184,8 @@ def label_of(body: Pieces, field: str) -> str:
     """What the colour bar says."""
     if field != "material":
         return SPACE_FIELDS[field]
-    named = body.solution.problem.elasticity.named
-    names = [f"{k} {name or material.kind}" for k, (name, material) in enumerate(named)]
+    material_by_set = body.solution.problem.elasticity.named
+    names = [f"{k} {name or material.kind}" for k, (name, material) in enumerate(material_by_set)]
     return f"material: {', '.join(names)}"
 
 
@@ -198,9 +210,9 @@ def _range(
     if limits is not None:
         return float(limits[0]), float(limits[1]), 100.0
     if field in STRESSES and body.solution.space.tips:
-        regular = values[body.corners[~body.solution.space.has_tip[body.cell]]]
+        regular_values = values[body.corners[~body.solution.space.has_tip[body.cell]]]
         low, high, share = clipped_range(
-            values[body.corners], body.volume, float(np.abs(regular).max(initial=0.0))
+            values[body.corners], body.volume, float(np.abs(regular_values).max(initial=0.0))
         )
         low, high = max(low, float(values.min())), min(high, float(values.max()))
     else:
@@ -209,7 +221,7 @@ def _range(
 
 
 def clipped_range(
-    values: Floats, measure: Floats, regular: float = 0.0
+    values: Floats, measure: Floats, regular_limit: float = 0.0
 ) -> tuple[float, float, float]:
     """Lowest and highest value without the few that are very large, and the share kept (%).
 
@@ -220,7 +232,7 @@ def clipped_range(
     measure : (k,) array
         Their areas or volumes: otherwise small pieces around a tip would count for more than
         they cover.
-    regular : float
+    regular_limit : float
         Values up to this size are kept at any rate.
     """
     low, high = float(values.min()), float(values.max())
@@ -228,12 +240,12 @@ def clipped_range(
     order = np.argsort(size, axis=None)
     area = np.cumsum(np.repeat(measure / size.shape[1], size.shape[1])[order])
     size_sorted = size.ravel()[order]
-    enough = size_sorted[min(np.searchsorted(area, _SHARE / 100 * area[-1]), len(area) - 1)]
-    top = max(regular, float(enough))
+    limit = size_sorted[min(np.searchsorted(area, _SHARE / 100 * area[-1]), len(area) - 1)]
+    top = max(regular_limit, float(limit))
     if max(-low, high) <= top:
         return low, high, 100.0
-    within = np.searchsorted(size_sorted, top, side="right") - 1
-    return max(low, -top), min(high, top), 100 * float(area[within] / area[-1])
+    last_shown = np.searchsorted(size_sorted, top, side="right") - 1
+    return max(low, -top), min(high, top), 100 * float(area[last_shown] / area[-1])
 
 
 def rounded_range(low: float, high: float, field: str) -> tuple[float, float]:
@@ -256,8 +268,8 @@ def _triangles(body: Pieces) -> Ints:
     for block in (body.plain, body.split):
         if block.shape[1] == 6:
             a, b, c, ab, ac, bc = block.T
-            small = [(a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac)]
-            parts.append(np.stack([np.stack(t, axis=1) for t in small], axis=1).reshape(-1, 3))
+            quarters = [(a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac)]
+            parts.append(np.stack([np.stack(t, axis=1) for t in quarters], axis=1).reshape(-1, 3))
         else:
             parts.append(block)
     return np.concatenate(parts)
@@ -292,10 +304,10 @@ def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints, Bool
     rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
     outer = on & rim[cell]
     facet = mesh.cell_to_facet[cell, np.argmax(outer, axis=1)]
-    between = np.zeros(len(mesh.facets), dtype=bool)
-    between[body.solution.problem.elasticity.interfaces] = True
-    bonded = (on & between[mesh.cell_to_facet[cell]]).any(axis=1)
-    return np.asarray(on.any(axis=1)), np.where(outer.any(axis=1), facet, -1), np.asarray(bonded)
+    is_interface = np.zeros(len(mesh.facets), dtype=bool)
+    is_interface[body.solution.problem.elasticity.interfaces] = True
+    is_bonded = (on & is_interface[mesh.cell_to_facet[cell]]).any(axis=1)
+    return np.asarray(on.any(axis=1)), np.where(outer.any(axis=1), facet, -1), np.asarray(is_bonded)
 
 
 def _curves(edge: Ints, points: Floats) -> Floats:
@@ -307,7 +319,7 @@ def _curves(edge: Ints, points: Floats) -> Floats:
 def _on_lips(body: Pieces, edge: Ints) -> tuple[Ints, Bools]:
     """Crack on which each edge lies, or -1, and whether its faces touch there."""
     crack = np.full(len(edge), -1, dtype=np.int64)
-    closed = np.zeros(len(edge), dtype=bool)
+    is_closed = np.zeros(len(edge), dtype=bool)
     a, b = body.points[edge[:, 0]], body.points[edge[:, 1]]
     tolerance = _NEAR * float(body.solution.space.mesh.cell_size.min())
     for c, phi in enumerate(body.phi):
@@ -319,5 +331,5 @@ def _on_lips(body: Pieces, edge: Ints) -> tuple[Ints, Bools]:
         contact = body.solution.contact[c]
         if contact is not None and is_on_crack.any():
             nearest = cKDTree(contact.points).query((a[is_on_crack] + b[is_on_crack]) / 2)[1]
-            closed[is_on_crack] = contact.closed[nearest]
-    return crack, closed
+            is_closed[is_on_crack] = contact.closed[nearest]
+    return crack, is_closed

@@ -150,38 +150,40 @@ def space_scene(
 ) -> SpaceScene:
     """Field on the moved body: its surface, and with a plane its section, crack faces behind."""
     body = pieces(solution)
-    shown = field_values(body, field)
-    curved = CurvedSides.of(solution.space.mesh)
-    on = faces(body, curved)
+    shown_values = field_values(body, field)
+    curved_sides = CurvedSides.of(solution.space.mesh)
+    on = faces(body, curved_sides)
     at_rest = body.points
-    if curved is not None:  # nodes between corners, so that a section ends where the shell does
+    if (
+        curved_sides is not None
+    ):  # nodes between corners, so that a section ends where the shell does
         at_rest = at_rest.copy()
         number, first = np.unique(on.shell, return_index=True)
-        facet = _on_curve(curved, on)
-        at_rest[number] = curved.nearest(at_rest[number], facet[first])
+        facet = _on_curve(curved_sides, on)
+        at_rest[number] = curved_sides.nearest(at_rest[number], facet[first])
     level = levels(at_rest, plane)
-    drawn = [TriangleSoup.of(on.shell, None, on.of_shell).behind(level)]
-    drawn.append(TriangleSoup.of(on.lip).behind(level))
+    parts = [TriangleSoup.of(on.shell, None, on.of_shell).behind(level)]
+    parts.append(TriangleSoup.of(on.lip).behind(level))
     lines = [
         segments_behind(on.outline, level, on.of_outline),
         segments_behind(on.rims, level),
         segments_behind(on.cell_edges, level, on.of_cell_edges),
     ]
     if plane is not None:
-        drawn.append(section(body, level))
+        parts.append(section(body, level))
         lines[0] += crossing(on.shell, level, on.of_shell)
         lines[1] += crossing(on.lip, level)
         lines[2] += crossing(on_facets(body, level), level)
-    given = np.concatenate([body.displacement, shown[:, None]], axis=1)
+    point_data = np.concatenate([body.displacement, shown_values[:, None]], axis=1)
 
-    def placed(part: TriangleSoup) -> tuple[Floats, Floats, Floats]:
+    def place_part(part: TriangleSoup) -> tuple[Floats, Floats, Floats]:
         """Corners at rest, moved ones, and values there."""
-        x, data = part.at(at_rest), part.at(given)
-        if curved is not None:
-            x, data = _curved_parts(curved, on, part, x, data)
+        x, data = part.at(at_rest), part.at(point_data)
+        if curved_sides is not None:
+            x, data = _curved_parts(curved_sides, on, part, x, data)
         return x, x + warp * data[..., :3], data[..., 3]
 
-    _, corners, values = (np.concatenate(each) for each in zip(*map(placed, drawn)))
+    _, corners, values = (np.concatenate(each) for each in zip(*map(place_part, parts)))
     if not len(corners):
         raise ProblemError("plot(clip=...): the plane leaves nothing of the body; turn its normal.")
     share = 100.0
@@ -192,10 +194,10 @@ def space_scene(
     clip = limits is None and share < 100
     nothing = np.zeros((0, 3, 3))
     curves = [
-        np.concatenate([placed(part)[1] for part in group] or [np.zeros((0, 2, 3))])
+        np.concatenate([place_part(part)[1] for part in group] or [np.zeros((0, 2, 3))])
         for group in lines
     ]
-    outline_rest = np.concatenate([placed(part)[0] for part in lines[0]])
+    outline_rest = np.concatenate([place_part(part)[0] for part in lines[0]])
     return SpaceScene(
         triangles=corners,
         values=values,
@@ -218,27 +220,27 @@ def space_scene(
 
 
 def _curved_parts(
-    curved: CurvedSides, on: Faces, part: TriangleSoup, x: Floats, data: Floats
+    curved_sides: CurvedSides, on: Faces, part: TriangleSoup, x: Floats, data: Floats
 ) -> tuple[Floats, Floats]:
     """Segments and triangles of a part that follow the curves on which they lie, or end."""
     if x.shape[1] == 2 or part.number.shape[1] > 3:
-        return curved.bend(x, part.facet, data)[:2]
-    flat = (part.facet < 0) | (curved.facet_to_curve[part.facet] < 0)
-    whole = flat & (part.share == np.eye(3)).all(axis=(1, 2))  # not cut by the plane
-    edges = curved.facets_of_edges(part.number[whole], on.cell_edges, on.of_cell_edges)
-    beside = curved.bend_edges(x[whole], edges, data[whole])
-    rest = curved.bend(x[~whole], part.facet[~whole], data[~whole])
-    return np.concatenate([beside[0], rest[0]]), np.concatenate([beside[1], rest[1]])
+        return curved_sides.bend(x, part.facet, data)[:2]
+    is_flat = (part.facet < 0) | (curved_sides.facet_to_curve[part.facet] < 0)
+    is_whole = is_flat & (part.share == np.eye(3)).all(axis=(1, 2))  # not cut by the plane
+    edges = curved_sides.facets_of_edges(part.number[is_whole], on.cell_edges, on.of_cell_edges)
+    edge_values = curved_sides.bend_edges(x[is_whole], edges, data[is_whole])
+    rest = curved_sides.bend(x[~is_whole], part.facet[~is_whole], data[~is_whole])
+    return np.concatenate([edge_values[0], rest[0]]), np.concatenate([edge_values[1], rest[1]])
 
 
-def _on_curve(curved: CurvedSides, on: Faces) -> Ints:
+def _on_curve(curved_sides: CurvedSides, on: Faces) -> Ints:
     """For each point of the shell, in the order of its triangles, a facet that has it.
 
     A curved one where there is one.
     """
     facet = np.repeat(on.of_shell, 3)
     number = on.shell.ravel()
-    order = np.argsort(curved.facet_to_curve[facet] < 0, kind="stable")
+    order = np.argsort(curved_sides.facet_to_curve[facet] < 0, kind="stable")
     best = np.full(int(number.max(initial=-1)) + 1, -1)
     best[number[order[::-1]]] = facet[order[::-1]]
     return np.asarray(best[number])
@@ -257,11 +259,11 @@ def crack_scene(
     lips = [lip_faces(solution, c) for c in cracks]
     corners = np.concatenate([_middle_of_lips(each, warp)[each.triangles] for each in lips])
     values = np.concatenate([lip_values(each, field) for each in lips])
-    coloured = np.concatenate([is_coloured(each, field) for each in lips])
+    is_in_colour = np.concatenate([is_coloured(each, field) for each in lips])
     nothing = np.zeros((0, 3, 3))
     low, high = (0.0, 1.0)
-    if coloured.any():
-        low, high = float(values[coloured].min()), float(values[coloured].max())
+    if is_in_colour.any():
+        low, high = float(values[is_in_colour].min()), float(values[is_in_colour].max())
     # Gaps are closed in the mean of a cell only: near contact some points lie a bit too deep.
     if field != "pressure" and low > -0.3 * high:
         low = 0.0
@@ -270,13 +272,13 @@ def crack_scene(
     low, high = rounded_range(low, high, field) if limits is None else limits
     return replace(
         _seen_through(solution, warp, plane),
-        triangles=corners[coloured],
-        values=values[coloured],
+        triangles=corners[is_in_colour],
+        values=values[is_in_colour],
         label=LIP_FIELDS[field],
         limits=(low, high),
         has_sign=low < 0 < high,
-        closed_faces=nothing if field == "pressure" else corners[~coloured],
-        open_faces=corners[~coloured] if field == "pressure" else nothing,
+        closed_faces=nothing if field == "pressure" else corners[~is_in_colour],
+        open_faces=corners[~is_in_colour] if field == "pressure" else nothing,
         rims=np.concatenate([_middle_of_lips(each, warp)[each.mouth] for each in lips]),
         cell_edges=edges_of(corners),
         view_direction=_viewing_direction(plane, view, lips),
@@ -288,21 +290,21 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
     space = solution.space
     lips = [lip_faces(solution, c) for c in range(len(space.cuts))]
     corners = [each.points[each.triangles] for each in lips]
-    through = _seen_through(solution, 0.0, plane, with_cells=True)
-    carries = np.zeros(space.n_nodes, dtype=bool)
+    lines_through = _seen_through(solution, 0.0, plane, with_cells=True)
+    has_jump = np.zeros(space.n_nodes, dtype=bool)
     for number in space.heaviside:
-        carries |= number >= 0
-    around = np.zeros(space.mesh.n_points, dtype=bool)
+        has_jump |= number >= 0
+    has_tip = np.zeros(space.mesh.n_points, dtype=bool)
     for tip in space.tips:
-        around |= tip.point_to_function >= 0
+        has_tip |= tip.point_to_function >= 0
     every = np.concatenate([np.zeros((0, 3, 3)), *corners])
     return replace(
-        through,
+        lines_through,
         closed_faces=every,
         cell_edges=edges_of(every),
         view_direction=_viewing_direction(plane, view, lips),
-        heaviside=space.node_points[carries],
-        tip=space.mesh.points[around],
+        heaviside=space.node_points[has_jump],
+        tip=space.mesh.points[has_tip],
     )
 
 
@@ -312,24 +314,24 @@ def _seen_through(
     """The body and its fronts without colours, and the edges of its cells where asked for."""
     mesh = solution.space.mesh
     displacement = solution.coefficients[: mesh.n_points]
-    curved = CurvedSides.of(mesh)
+    curved_sides = CurvedSides.of(mesh)
     level = levels(mesh.points, plane)
     facets, outer = mesh.boundary, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-    edges, facet, is_sharp = boundary_edges(mesh, curved)
-    sharp = segments_behind(edges[is_sharp], level, facet[is_sharp])
+    edges, facet, is_sharp = boundary_edges(mesh, curved_sides)
+    sharp_lines = segments_behind(edges[is_sharp], level, facet[is_sharp])
     if plane is not None:
-        sharp += crossing(facets, level, outer)
+        sharp_lines += crossing(facets, level, outer)
 
-    def placed(part: TriangleSoup) -> Floats:
+    def place_part(part: TriangleSoup) -> Floats:
         x, data = part.at(mesh.points), part.at(displacement)
-        if curved is not None:
-            x, data, _ = curved.bend(x, part.facet, data)
+        if curved_sides is not None:
+            x, data, _ = curved_sides.bend(x, part.facet, data)
         return x + warp * data
 
-    skin = placed(TriangleSoup.of(facets, None, outer).behind(level))
-    faint = [placed(part) for part in segments_behind(edges, level, facet)]
-    empty = np.zeros((0, 2, 3))
-    outline = np.concatenate([placed(part) for part in sharp] or [empty])
+    skin = place_part(TriangleSoup.of(facets, None, outer).behind(level))
+    faint_lines = [place_part(part) for part in segments_behind(edges, level, facet)]
+    no_lines = np.zeros((0, 2, 3))
+    outline = np.concatenate([place_part(part) for part in sharp_lines] or [no_lines])
     return SpaceScene(
         triangles=np.zeros((0, 3, 3)),
         values=np.zeros((0, 3)),
@@ -340,9 +342,9 @@ def _seen_through(
         open_faces=np.zeros((0, 3, 3)),
         skin=skin,
         outline=outline,
-        cell_edges=empty,
-        faint_lines=np.concatenate(faint) if with_cells else empty,
-        rims=empty,
+        cell_edges=no_lines,
+        faint_lines=np.concatenate(faint_lines) if with_cells else no_lines,
+        rims=no_lines,
         fronts=_front_lines(solution, warp, None),
         junctions=_junction_lines(solution, warp, None),
         view_direction=np.array([0.0, -1.0, 0.0]),
@@ -363,8 +365,8 @@ def is_coloured(lips: LipFaces, field: str) -> Bools:
     Crack faces that touch slide without friction: sliding is shown everywhere.
     """
     if field == "pressure":
-        bears = lips.mean_pressure > 1e-6 * float(lips.mean_pressure.max(initial=0.0))
-        return np.asarray(bears | (lips.closed >= _TOUCH))
+        is_pressed = lips.mean_pressure > 1e-6 * float(lips.mean_pressure.max(initial=0.0))
+        return np.asarray(is_pressed | (lips.closed >= _TOUCH))
     return np.asarray(lips.closed < _TOUCH) | (field == "sliding")
 
 
@@ -385,8 +387,8 @@ def _lines_behind(edges: list[tuple[LipFaces, Ints]], warp: float, plane: Plane 
     """Edges of crack faces as segments `(k, 2, 3)`, as far as they lie behind a plane."""
     parts = [np.zeros((0, 2, 3))]
     for lips, pairs in edges:
-        behind = segments_behind(pairs, levels(lips.points, plane))
-        parts += [part.at(_middle_of_lips(lips, warp)) for part in behind]
+        parts_behind = segments_behind(pairs, levels(lips.points, plane))
+        parts += [part.at(_middle_of_lips(lips, warp)) for part in parts_behind]
     return np.concatenate(parts)
 
 
@@ -396,18 +398,20 @@ def _viewing_direction(
     """From the body to the viewer: what was cut open, or the faces of the crack, is seen."""
     if view is not None:
         return view
-    usual = np.array([0.45, -0.75, 0.48])
+    usual_direction = np.array([0.45, -0.75, 0.48])
     if plane is not None:
-        ahead = plane[1]
+        direction = plane[1]
     elif lips:
-        ahead = np.sum([(each.area[:, None] * _face_normals(each)).sum(axis=0) for each in lips], 0)
-        length = float(np.linalg.norm(ahead))
-        ahead = ahead / length if length else usual
-        ahead = ahead if ahead @ usual >= 0 else -ahead
+        direction = np.sum(
+            [(each.area[:, None] * _face_normals(each)).sum(axis=0) for each in lips], 0
+        )
+        length = float(np.linalg.norm(direction))
+        direction = direction / length if length else usual_direction
+        direction = direction if direction @ usual_direction >= 0 else -direction
     else:
-        return np.asarray(usual / np.linalg.norm(usual))
-    side = usual - 0.999 * (usual @ ahead) * ahead
-    both = ahead + 0.75 * side / np.linalg.norm(side)
+        return np.asarray(usual_direction / np.linalg.norm(usual_direction))
+    side = usual_direction - 0.999 * (usual_direction @ direction) * direction
+    both = direction + 0.75 * side / np.linalg.norm(side)
     return np.asarray(both / np.linalg.norm(both))
 
 
@@ -446,28 +450,28 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
             continue
         facets = mesh.facet_sets[load.where]
         x = mesh.points[facets].mean(axis=1)
-        turned = _area_vectors(mesh, facets)
-        area = np.linalg.norm(turned, axis=1)
+        area_vectors = _area_vectors(mesh, facets)
+        area = np.linalg.norm(area_vectors, axis=1)
         middle = area @ x / area.sum()
         if load.has_one_arrow:
             force = np.zeros(3) if load.force is None else load.force
             forces.append(np.stack([middle, sign * force, np.zeros(3)])[None])
             continue
-        out = turned / area[:, None]
-        t = sign * load.traction(FacetPoints(mesh, facets, x, out, area))
+        outward_normal = area_vectors / area[:, None]
+        t = sign * load.traction(FacetPoints(mesh, facets, x, outward_normal, area))
         if np.ptp(x, axis=0).max() < _SMALL * mesh.extent:
-            forces.append(np.stack([middle, area @ t, area @ out])[None])
+            forces.append(np.stack([middle, area @ t, area @ outward_normal])[None])
         else:
             chosen = _distant_points(x, _MANY)
-            tractions.append(np.stack([x, t, out], axis=1)[chosen])
+            tractions.append(np.stack([x, t, outward_normal], axis=1)[chosen])
     start, vector = [], []
     for group in (np.concatenate(forces), np.concatenate(tractions)):
         size = np.linalg.norm(group[:, 1], axis=1)
-        shown = size > 1e-3 * size.max(initial=0.0)
-        x, v, out = np.swapaxes(group[shown], 0, 1)
+        is_shown = size > 1e-3 * size.max(initial=0.0)
+        x, v, outward_normal = np.swapaxes(group[is_shown], 0, 1)
         v = v * (_LENGTH * mesh.extent / size.max(initial=1e-300))
-        pressing = np.einsum("kd,kd->k", v, out) < -1e-6 * np.linalg.norm(v, axis=1)
-        start.append(np.where(pressing[:, None], x - v, x))
+        is_pressing = np.einsum("kd,kd->k", v, outward_normal) < -1e-6 * np.linalg.norm(v, axis=1)
+        start.append(np.where(is_pressing[:, None], x - v, x))
         vector.append(v)
     return np.concatenate(start), np.concatenate(vector)
 

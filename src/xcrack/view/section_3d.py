@@ -68,12 +68,15 @@ class TriangleSoup:
         values = level[self.number]
         low, high = values.min(axis=1), values.max(axis=1)
         # The section has what lies in the plane, on the side that is drawn: lips lie there twice.
-        uncut, split = np.nonzero((high <= 0) & (low < 0))[0], np.nonzero((low < 0) & (high > 0))[0]
+        whole_rows, split = (
+            np.nonzero((high <= 0) & (low < 0))[0],
+            np.nonzero((low < 0) & (high > 0))[0],
+        )
         bary, _, side, parent = cut_simplices(values[split])
         is_behind = side < 0
-        rows = np.concatenate([uncut, split[parent[is_behind]]])
+        rows = np.concatenate([whole_rows, split[parent[is_behind]]])
         v = self.number.shape[1]
-        corner = np.broadcast_to(np.eye(v), (len(uncut), v, v))
+        corner = np.broadcast_to(np.eye(v), (len(whole_rows), v, v))
         share = np.concatenate([corner, bary[is_behind]])
         return TriangleSoup(self.number[rows], share, self.facet[rows])
 
@@ -97,15 +100,15 @@ def segments_behind(
         return [TriangleSoup.of(number, None, facet)]
     a, b = level[number].T
     is_whole = (a <= 0) & (b <= 0)
-    crossed = a * b < 0
-    t = a[crossed] / (a[crossed] - b[crossed])
+    is_crossed = a * b < 0
+    t = a[is_crossed] / (a[is_crossed] - b[is_crossed])
     # Both vertices on the side that is kept, one of them the cut point.
     share = np.zeros((len(t), 2, 2))
     share[:, 0] = np.stack([1 - t, t], axis=1)
-    retained = np.where(a[crossed] < 0, 0, 1)
-    share[np.arange(len(t)), 1, retained] = 1.0
-    whole = TriangleSoup.of(number[is_whole], None, facet[is_whole])
-    return [whole, TriangleSoup(number[crossed], share, facet[crossed])]
+    corner_behind = np.where(a[is_crossed] < 0, 0, 1)
+    share[np.arange(len(t)), 1, corner_behind] = 1.0
+    whole_segments = TriangleSoup.of(number[is_whole], None, facet[is_whole])
+    return [whole_segments, TriangleSoup(number[is_crossed], share, facet[is_crossed])]
 
 
 def crossing(
@@ -159,11 +162,11 @@ class Faces:
     of_cell_edges: Ints
 
 
-def faces(body: Pieces, curved: CurvedSides | None) -> Faces:
+def faces(body: Pieces, curved_sides: CurvedSides | None) -> Faces:
     """Triangles on boundary and crack faces, and segments: sharp, of crack faces, of cells."""
     mesh = body.solution.space.mesh
     rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
-    sharp = sharp_edges(mesh, curved)
+    is_sharp = sharp_edges(mesh, curved_sides)
     on_lip = _lip_points(body)
     groups: list[list[Ints]] = [[np.zeros((0, 3), np.int64)], [np.zeros((0, 3), np.int64)]]
     lines: list[list[Ints]] = [[np.zeros((0, 2), np.int64)] for _ in range(3)]
@@ -179,12 +182,14 @@ def faces(body: Pieces, curved: CurvedSides | None) -> Faces:
         zero = _vanishing_coordinates(mesh, body, block, cell)
         for face in local_facets(3):
             at = zero[:, face].all(axis=1) & rim[cell]
-            outside = at.any(axis=1)
-            touches = on_lip[block[:, face]].all(axis=1) & ~outside
+            is_outside = at.any(axis=1)
+            is_on_lip = on_lip[block[:, face]].all(axis=1) & ~is_outside
             facet = mesh.cell_to_facet[cell, np.argmax(at, axis=1)]
-            groups[0].append(_small_faces(block[outside], face))
-            of_shell.append(np.repeat(facet[outside], len(groups[0][-1]) // max(outside.sum(), 1)))
-            groups[1].append(_small_faces(block[touches], face))
+            groups[0].append(_small_faces(block[is_outside], face))
+            of_shell.append(
+                np.repeat(facet[is_outside], len(groups[0][-1]) // max(is_outside.sum(), 1))
+            )
+            groups[1].append(_small_faces(block[is_on_lip], face))
             for i, j in ((0, 1), (1, 2), (0, 2)):
                 a, b = face[i], face[j]
                 two = zero[:, a] & zero[:, b]
@@ -194,15 +199,15 @@ def faces(body: Pieces, curved: CurvedSides | None) -> Faces:
                     r, s = (v for v in range(4) if v not in (p, q))
                     on = two[:, r] & two[:, s]
                     edge |= on
-                    feature |= on & sharp[mesh.cell_to_edge[cell, e]]
-                mouth = touches & (two & rim[cell]).any(axis=1)
-                for k, rows in enumerate((outside & feature, mouth, outside & edge)):
+                    feature |= on & is_sharp[mesh.cell_to_edge[cell, e]]
+                mouth = is_on_lip & (two & rim[cell]).any(axis=1)
+                for k, rows in enumerate((is_outside & feature, mouth, is_outside & edge)):
                     lines[k].append(_halves(block[rows], a, b))
                     each = len(lines[k][-1]) // max(int(rows.sum()), 1)
                     of_lines[k].append(np.tile(facet[rows], each))
     shell, lip = (np.concatenate(group) for group in groups)
     outline, rims, cells = (
-        unique_segments(np.concatenate(line), np.concatenate(facet), curved)
+        unique_segments(np.concatenate(line), np.concatenate(facet), curved_sides)
         for line, facet in zip(lines, of_lines, strict=True)
     )
     return Faces(
@@ -210,13 +215,13 @@ def faces(body: Pieces, curved: CurvedSides | None) -> Faces:
     )
 
 
-def unique_segments(line: Ints, facet: Ints, curved: CurvedSides | None) -> tuple[Ints, Ints]:
+def unique_segments(line: Ints, facet: Ints, curved_sides: CurvedSides | None) -> tuple[Ints, Ints]:
     """Segments, each once, and the facet on which each lies: a curved one if there is one."""
-    if curved is not None:
-        order = np.argsort(curved.facet_to_curve[facet] < 0, kind="stable")
+    if curved_sides is not None:
+        order = np.argsort(curved_sides.facet_to_curve[facet] < 0, kind="stable")
         line, facet = line[order], facet[order]
-    unique, first = np.unique(np.sort(line, axis=1), axis=0, return_index=True)
-    return unique, facet[first]
+    pairs, first = np.unique(np.sort(line, axis=1), axis=0, return_index=True)
+    return pairs, facet[first]
 
 
 def _vanishing_coordinates(mesh: Mesh, body: Pieces, block: Ints, cell: Ints) -> Bools:
@@ -273,7 +278,7 @@ def _middle_of(a: int, b: int) -> int:
     return 4 + local_edges(3).tolist().index(pair)
 
 
-def sharp_edges(mesh: Mesh, curved: CurvedSides | None) -> Bools:
+def sharp_edges(mesh: Mesh, curved_sides: CurvedSides | None) -> Bools:
     """Edges of the mesh at which its boundary turns `(e,)`, other than between its chords."""
     facets = mesh.boundary
     x = mesh.points[facets]
@@ -287,29 +292,29 @@ def sharp_edges(mesh: Mesh, curved: CurvedSides | None) -> Bools:
     # Facets need not turn alike: only the angle between their planes counts.
     turn = np.abs(np.einsum("kd,kd->k", normal[owner[same_edge]], normal[owner[same_edge + 1]]))
     is_sharp = turn < _SHARP
-    if curved is not None:
-        side = curved.facet_to_curve[mesh.facet_to_cell[:, 1] < 0]
+    if curved_sides is not None:
+        side = curved_sides.facet_to_curve[mesh.facet_to_cell[:, 1] < 0]
         one, other = side[owner[same_edge]], side[owner[same_edge + 1]]
         is_sharp &= (one != other) | (one < 0)
-    sharp = np.unique(key[order][same_edge[is_sharp]])
+    sharp_keys = np.unique(key[order][same_edge[is_sharp]])
     edges = np.sort(mesh.edges, axis=1)
-    return np.isin(edges[:, 0] * mesh.n_points + edges[:, 1], sharp)
+    return np.isin(edges[:, 0] * mesh.n_points + edges[:, 1], sharp_keys)
 
 
-def boundary_edges(mesh: Mesh, curved: CurvedSides | None) -> tuple[Ints, Ints, Bools]:
+def boundary_edges(mesh: Mesh, curved_sides: CurvedSides | None) -> tuple[Ints, Ints, Bools]:
     """Edges of the boundary `(e, 2)`, the facet on which each lies, and which are sharp."""
     outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     pairs = mesh.facets[outer][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    edges, facet = unique_segments(pairs, np.repeat(outer, 3), curved)
-    sharp = np.sort(mesh.edges[sharp_edges(mesh, curved)], axis=1)
-    key, of_sharp = (pair[:, 0] * mesh.n_points + pair[:, 1] for pair in (edges, sharp))
+    edges, facet = unique_segments(pairs, np.repeat(outer, 3), curved_sides)
+    sharp_pairs = np.sort(mesh.edges[sharp_edges(mesh, curved_sides)], axis=1)
+    key, of_sharp = (pair[:, 0] * mesh.n_points + pair[:, 1] for pair in (edges, sharp_pairs))
     return edges, facet, np.isin(key, of_sharp)
 
 
 def areas(corners: Floats) -> Floats:
     """Areas of triangles `(k, 3, 3)`."""
-    turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(np.linalg.norm(turned, axis=1) / 2)
+    area_vector = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(np.linalg.norm(area_vector, axis=1) / 2)
 
 
 def edges_of(corners: Floats) -> Floats:

@@ -90,8 +90,8 @@ def _edges(mesh: Mesh) -> Floats:
     pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), 1)
     order = np.lexsort(pairs.T)
     owner = np.tile(np.arange(len(facets)), 3)[order].reshape(-1, 2)  # each edge has two facets
-    bent = np.abs((normal[owner[:, 0]] * normal[owner[:, 1]]).sum(axis=1)) < _EDGE
-    return np.asarray(mesh.points[pairs[order][::2][bent]])
+    is_bent = np.abs((normal[owner[:, 0]] * normal[owner[:, 1]]).sum(axis=1)) < _EDGE
+    return np.asarray(mesh.points[pairs[order][::2][is_bent]])
 
 
 # Loads.
@@ -101,15 +101,15 @@ def _draw_loads(axes: Any, problem: Problem) -> None:
     mesh = problem.mesh
     for load in problem.loads:
         rows = list(_arrows_of(load, mesh)) if isinstance(load, Load) else []
-        shown = [(x, v) for x, v in rows if np.linalg.norm(v) > 0]
-        _entry(axes, mesh.dim, load.name, _LOAD, ">" if shown else "none")
-        if not shown:
+        arrows = [(x, v) for x, v in rows if np.linalg.norm(v) > 0]
+        _entry(axes, mesh.dim, load.name, _LOAD, ">" if arrows else "none")
+        if not arrows:
             continue
-        x, v = (np.array(part) for part in zip(*shown, strict=True))
+        x, v = (np.array(part) for part in zip(*arrows, strict=True))
         size = np.linalg.norm(v, axis=1)
         v = v * (_ARROW * mesh.extent / size.max())
-        out = _leaves(mesh, x, v)
-        start = np.where(out[:, None], x, x - v)
+        is_outward = _leaves(mesh, x, v)
+        start = np.where(is_outward[:, None], x, x - v)
         if mesh.dim == 2:
             axes.quiver(*start.T, *v.T, color=_LOAD, angles="xy", scale_units="xy", scale=1,
                         width=0.006, zorder=5)  # fmt: skip
@@ -190,10 +190,10 @@ def _draw_supports(axes: Any, problem: Problem) -> None:
 
 def _draw_cracks(axes: Any, problem: Problem) -> None:
     dim = problem.mesh.dim
-    shown = problem.cracks
-    placed = problem.__dict__.get("placed", shown)
+    cracks = problem.cracks
+    placed_cracks = problem.__dict__.get("placed", cracks)
     length = 0.5 * _ARROW * problem.mesh.extent
-    for c, crack in enumerate(shown):
+    for c, crack in enumerate(cracks):
         if dim == 3:
             from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
@@ -210,11 +210,11 @@ def _draw_cracks(axes: Any, problem: Problem) -> None:
         else:
             axes.quiver(*middle, *v, color=_CRACK, arrow_length_ratio=0.3, lw=1.2, zorder=5)
         axes.text(*(middle + 1.25 * v), f"{c}", color=_CRACK, fontsize="small", zorder=7)
-        tips = placed[c].tips if dim == 2 else None
-        ends = [] if tips is None else placed[c].points[list(tips)]
+        tips = placed_cracks[c].tips if dim == 2 else None
+        ends = [] if tips is None else placed_cracks[c].points[list(tips)]
         if len(ends):
             axes.plot(*np.transpose(ends), "x", color=_CRACK, ms=7, mew=1.8, zorder=6)
-    if len(shown):
+    if len(cracks):
         words = "cracks with their normal (- to + face)"
         words += "; x: tips" if dim == 2 else ""
         _entry(axes, dim, words, _CRACK, "_")
@@ -235,19 +235,19 @@ def _middle_normal(corner: Floats) -> tuple[Floats, Floats]:
 def _name_sets(axes: Any, problem: Problem) -> None:
     """Names of the facet sets, beside them and off the body where it is flat."""
     mesh = problem.mesh
-    loaded = {load.place for load in problem.loads if isinstance(load.place, str)}
+    loaded_places = {load.place for load in problem.loads if isinstance(load.place, str)}
     for name, facets in mesh.facet_sets.items():
         if len(facets) in (0, len(mesh.boundary)):
             continue
         x, normal, _ = _sides(mesh, facets)
         k = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
-        off = 1.15 * _ARROW if name in loaded and mesh.dim == 2 else 0.035
-        off = min(off * mesh.extent, 0.35 * float(np.ptp(x, axis=0).max()) or np.inf)
-        place = x[k] + off * normal[k]
+        offset = 1.15 * _ARROW if name in loaded_places and mesh.dim == 2 else 0.035
+        offset = min(offset * mesh.extent, 0.35 * float(np.ptp(x, axis=0).max()) or np.inf)
+        place = x[k] + offset * normal[k]
         middle = {"ha": "center", "va": "center"}
         if mesh.dim == 2:
-            across, up = normal[k]
-            middle = {"ha": "left" if across > 0.5 else "right" if across < -0.5 else "center",
+            sideways, up = normal[k]
+            middle = {"ha": "left" if sideways > 0.5 else "right" if sideways < -0.5 else "center",
                       "va": "bottom" if up > 0.5 else "top" if up < -0.5 else "center"}  # fmt: skip
         axes.text(*place, name, fontsize="small", color="0.35", zorder=7, **middle)
 

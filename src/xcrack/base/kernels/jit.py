@@ -70,9 +70,9 @@ class _HelperLowering(NativeLowering):
         super().run_pass(state)
         # numba finds a function by its entry point. This one is a callable of its own, as numba
         # wants it, which refuses all arguments: Python has no business in a helper.
-        lowered, entry_point = state["cr"], f"{state.func_id.unique_name}".upper
-        state.targetctx.insert_user_function(entry_point, lowered.fndesc, [state.library])
-        state["cr"] = lowered._replace(cfunc=entry_point)
+        compile_result, entry_point = state["cr"], f"{state.func_id.unique_name}".upper
+        state.targetctx.insert_user_function(entry_point, compile_result.fndesc, [state.library])
+        state["cr"] = compile_result._replace(cfunc=entry_point)
         return True
 
 
@@ -143,12 +143,12 @@ class _Cache(caching.FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            loaded = super().load_overload(sig, target_context)
+            overload = super().load_overload(sig, target_context)
         except _DAMAGE:
-            loaded = None
-        if loaded is None:
+            overload = None
+        if overload is None:
             _announce()
-        return loaded
+        return overload
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
@@ -184,14 +184,14 @@ def kernel(function: Callable[..., Any]) -> Any:
     function : callable
     """
     is_helper = function.__name__.startswith("_")
-    compiled = numba.njit(
+    dispatcher = numba.njit(
         error_model="numpy", nogil=True, no_cfunc_wrapper=True, no_cpython_wrapper=is_helper,
         pipeline_class=_Helper if is_helper else _Kernel,
     )(function)  # fmt: skip
     if not numba.config.DISABLE_JIT:
-        compiled._cache = caching.NullCache() if is_helper else _cache_of(function)
-        compiled.get_call_template = _of_types(compiled.get_call_template)
-    return compiled
+        dispatcher._cache = caching.NullCache() if is_helper else _cache_of(function)
+        dispatcher.get_call_template = _of_types(dispatcher.get_call_template)
+    return dispatcher
 
 
 def _of_types(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
@@ -240,9 +240,9 @@ def _own_folder() -> Path | None:
     try:
         folder = Path(tempfile.gettempdir()) / f"xcrack-kernels-{user}"
         folder.mkdir(mode=0o700, exist_ok=True)
-        about = folder.lstat()
-        foreign = stat.S_IMODE(about.st_mode) & 0o022 or not stat.S_ISDIR(about.st_mode)
-        if foreign or (hasattr(os, "getuid") and about.st_uid != user):
+        status = folder.lstat()
+        is_foreign = stat.S_IMODE(status.st_mode) & 0o022 or not stat.S_ISDIR(status.st_mode)
+        if is_foreign or (hasattr(os, "getuid") and status.st_uid != user):
             return Path(tempfile.mkdtemp(prefix="xcrack-kernels-"))
         return folder
     except OSError:

@@ -28,9 +28,12 @@ def _rows_of(count: int) -> Any:
                 for k in (0, 1, 2, 3, 5)
             )
             scale, (low, high, place, row) = arguments[4], arguments[6:]
-            real = value.type.pointee
-            vector = ir.VectorType(real, WIDTH)
-            nothing, aligned = ir.Constant(vector, ir.Undefined), context.get_abi_sizeof(real)
+            scalar_type = value.type.pointee
+            vector = ir.VectorType(scalar_type, WIDTH)
+            nothing, alignment = (
+                ir.Constant(vector, ir.Undefined),
+                context.get_abi_sizeof(scalar_type),
+            )
             first_lane = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
 
             def spread(number: Any) -> Any:
@@ -42,7 +45,7 @@ def _rows_of(count: int) -> Any:
                 return builder.bitcast(first, vector.as_pointer())
 
             def load_vector(pointer: Any, number: Any) -> Any:
-                return builder.load(load_four(pointer, number), align=aligned)
+                return builder.load(load_four(pointer, number), align=alignment)
 
             sums = [cgutils.alloca_once(builder, vector) for _ in range(count)]
             for each in sums:
@@ -60,11 +63,11 @@ def _rows_of(count: int) -> Any:
                 number = builder.add(row, _SIZE(i))
                 term = builder.fmul(spread(scale), builder.load(each))
                 total = builder.fadd(load_vector(y, number), term)
-                builder.store(total, load_four(out, number), align=aligned)
+                builder.store(total, load_four(out, number), align=alignment)
             return context.get_dummy_value()
 
-        given = columns, values, x, y, scale, out
-        return types.void(*given, *[types.uint64] * 4), generate
+        argument_types = columns, values, x, y, scale, out
+        return types.void(*argument_types, *[types.uint64] * 4), generate
 
     return rows
 

@@ -8,7 +8,7 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def _half_angle(x, y, r, behind, side):  # type: ignore[no-untyped-def]
+def _half_angle(x, y, r, is_behind, side):  # type: ignore[no-untyped-def]
     """Cosine and sine of half the angle, continued along a lip that bends.
 
     Without trigonometry; the larger of the two by the root.
@@ -19,7 +19,7 @@ def _half_angle(x, y, r, behind, side):  # type: ignore[no-untyped-def]
     else:
         s = math.copysign(math.sqrt(0.5 * (1.0 - x / r)), y)
         c = 0.5 * y / (r * s)
-    if behind and side * s < 0.0:
+    if is_behind and side * s < 0.0:
         return -c, -s
     return c, s
 
@@ -34,17 +34,17 @@ def _bend(M, r, c, s):  # type: ignore[no-untyped-def]
     v = a * c + b * s + e * c3 + d * s3
     v1 = 0.5 * (b * c - a * s) + 1.5 * (d * c3 - e * s3)
     v2 = -0.25 * (a * c + b * s) - 2.25 * (e * c3 + d * s3)
-    along, across = 0.5 * v * C - v1 * S, 0.5 * v * S + v1 * C
+    derivative_along, derivative_across = 0.5 * v * C - v1 * S, 0.5 * v * S + v1 * C
     slope_along = -0.5 * (v1 * C + v * S) - v2 * S
     slope_across = 0.5 * (v * C - v1 * S) + v2 * C
-    return -(0.5 * along * C + slope_along * S) / size, -(
-        0.5 * across * C + slope_across * S
+    return -(0.5 * derivative_along * C + slope_along * S) / size, -(
+        0.5 * derivative_across * C + slope_across * S
     ) / size
 
 
 @kernel
 def _factor(  # type: ignore[no-untyped-def]
-    x, y, behind, side, weight, outer, inner, frame, modes, lam, mu, change, result
+    x, y, is_behind, side, weight, outer, inner, frame, modes, lam, mu, change, result
 ):  # fmt: skip
     """Set the factors (2, 2, 2) of one point; False where there are none.
 
@@ -53,7 +53,7 @@ def _factor(  # type: ignore[no-untyped-def]
     r = math.sqrt(x * x + y * y)
     if r >= outer or (r <= inner and change is None) or r == 0.0:
         return False
-    c, s = _half_angle(x, y, r, behind, side)
+    c, s = _half_angle(x, y, r, is_behind, side)
     width = outer - inner
     z = (r - inner) / width
     if change is not None:
@@ -183,12 +183,12 @@ def plain_ring(  # type: ignore[no-untyped-def]
     turn : (2,) array
         Integral of B_12 - B_21 of each mode.
     """
-    nodal, extra = np.zeros((len(chosen), 6, 2, 2)), np.zeros((len(chosen), 4, 2, 2))
+    of_nodes, of_tips = np.zeros((len(chosen), 6, 2, 2)), np.zeros((len(chosen), 4, 2, 2))
     turn, B, d = np.zeros(2), np.empty((2, 2, 2)), np.empty((10, 2))
     for k in range(len(chosen)):
         e = chosen[k]
         G = slopes[e]
-        behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
+        is_behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
         for p in range(len(share)):
             dx, dy = -tip[0], -tip[1]
             for b in range(3):
@@ -201,7 +201,7 @@ def plain_ring(  # type: ignore[no-untyped-def]
             if not _factor(
                 x,
                 y,
-                behind,
+                is_behind,
                 side[e],
                 share[p] * volume[e],
                 outer,
@@ -231,10 +231,10 @@ def plain_ring(  # type: ignore[no-untyped-def]
                 turn[m] += B[0, 1, m] - B[1, 0, m]
                 for i in range(2):
                     for a in range(6):
-                        nodal[k, a, i, m] += B[i, 0, m] * d[a, 0] + B[i, 1, m] * d[a, 1]
+                        of_nodes[k, a, i, m] += B[i, 0, m] * d[a, 0] + B[i, 1, m] * d[a, 1]
                     for a in range(4):
-                        extra[k, a, i, m] += B[i, 0, m] * d[6 + a, 0] + B[i, 1, m] * d[6 + a, 1]
-    return nodal, extra, turn
+                        of_tips[k, a, i, m] += B[i, 0, m] * d[6 + a, 0] + B[i, 1, m] * d[6 + a, 1]
+    return of_nodes, of_tips, turn
 
 
 @kernel

@@ -6,15 +6,15 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def _slopes(bary, gradient, sign, out):  # type: ignore[no-untyped-def]
-    """Gradients of the four functions of a cell at a point, into `out` (4, 2)."""
+def _slopes(bary, gradient, sign, slopes):  # type: ignore[no-untyped-def]
+    """Gradients of the four functions of a cell at a point, into `slopes` (4, 2)."""
     x, y, z = bary[0], bary[1], bary[2]
     for j in range(2):
         gx, gy, gz = gradient[0, j], gradient[1, j], gradient[2, j]
-        out[0, j] = sign[0] * ((2 * x * y - y * y) * gx + (x * x - 2 * x * y) * gy)
-        out[1, j] = sign[1] * ((2 * x * z - z * z) * gx + (x * x - 2 * x * z) * gz)
-        out[2, j] = sign[2] * ((2 * y * z - z * z) * gy + (y * y - 2 * y * z) * gz)
-        out[3, j] = y * z * gx + x * z * gy + x * y * gz
+        slopes[0, j] = sign[0] * ((2 * x * y - y * y) * gx + (x * x - 2 * x * y) * gy)
+        slopes[1, j] = sign[1] * ((2 * x * z - z * z) * gx + (x * x - 2 * x * z) * gz)
+        slopes[2, j] = sign[2] * ((2 * y * z - z * z) * gy + (y * y - 2 * y * z) * gz)
+        slopes[3, j] = y * z * gx + x * z * gy + x * y * gz
 
 
 @kernel
@@ -166,7 +166,7 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
     volume,
     functions,
     sign,
-    linear,
+    moments,
     square,
     lam,
     mu,
@@ -180,7 +180,7 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
     nodes : (cells, 6) array of int
     coefficients : (n, 2, m) array
     volume : (cells,) array
-    linear : (4, 3, 3) array
+    moments : (4, 3, 3) array
         Mean of each function's derivative (second axis) times a barycentric coordinate (third).
     square : (4, 3, 3) array
         Mean of the products of its derivatives.
@@ -188,7 +188,7 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
     columns = coefficients.shape[2]
     both = lam + 2.0 * mu
     stress = np.empty((columns, 3, 3))  # corner; xx, yy, xy
-    d, moved = np.empty((6, 2)), np.empty((4, 3, 2))
+    d, displaced = np.empty((6, 2)), np.empty((4, 3, 2))
     for k in range(len(cells)):
         e = cells[k]
         G, V = gradient[e], volume[e]
@@ -219,14 +219,14 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
                 for j in range(2):
                     rise = 0.0
                     for b in range(3):
-                        rise += linear[a, b, c] * G[b, j]
-                    moved[a, c, j] = s * rise
+                        rise += moments[a, b, c] * G[b, j]
+                    displaced[a, c, j] = s * rise
         for a in range(4):
             f = functions[e, a]
             for m in range(columns):
                 first, second = 0.0, 0.0
                 for c in range(3):
-                    x, y = moved[a, c, 0], moved[a, c, 1]
+                    x, y = displaced[a, c, 0], displaced[a, c, 1]
                     first += stress[m, c, 0] * x + stress[m, c, 2] * y
                     second += stress[m, c, 2] * x + stress[m, c, 1] * y
                 residual[f, 0, m] -= first

@@ -24,8 +24,8 @@ def _interpolated_rate(weight, line, x, row, values, is_root, exponent, place, k
 @kernel
 def march_places(  # type: ignore[no-untyped-def]
     length,
-    most,
-    least,
+    most_cycles,
+    least_block,
     order,
     weight,
     line,
@@ -40,7 +40,7 @@ def march_places(  # type: ignore[no-untyped-def]
     shutoff,
     since,
     size,
-    over,
+    zone_K,
     position,
     part,
     arc,
@@ -52,9 +52,9 @@ def march_places(  # type: ignore[no-untyped-def]
     ----------
     length : float, length
         Sum of the largest growth of any place in each cycle, to go to.
-    most : float
+    most_cycles : float
         Cycles to stop at.
-    least : float, length
+    least_block : float, length
         A block whose growths add up to no more ends it: nothing grows.
     order : (c,) array of int
         Kinds of the cycles of a block, in time.
@@ -74,12 +74,12 @@ def march_places(  # type: ignore[no-untyped-def]
     model : int
         0: none, 1: Wheeler, 2: Willenborg.
     w, shutoff : (n,) arrays
-    since, size, over : (n,) arrays
+    since, size, zone_K : (n,) arrays
         Growth since the overload, its zone and K; changed.
     position : int
         Number in the block of the cycle to begin with.
     part : float
-        Of that cycle that is over.
+        Of that cycle that has passed.
     arc : (g, n) array, length
         Growth of the places at the g points; written.
     cycles : (g,) array
@@ -87,23 +87,23 @@ def march_places(  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    reached : float, length
-        `length`, or less where `most` was reached or nothing grows; the rows of `arc` and
+    length_reached : float, length
+        `length`, or less where `most_cycles` was reached or nothing grows; the rows of `arc` and
         `cycles` behind it hold the last values.
     position, part
         Where the block is then.
-    elapsed : float
+    cycles_elapsed : float
         Cycles.
     """
     n, n_cycles, n_points, n_shifts = len(since), len(order), len(arc), values.shape[3]
     spacing = length / (n_points - 1)
     growth, sum_of = np.zeros(n), np.zeros(n)
-    reached, elapsed, block, counted, filled = 0.0, 0.0, 0.0, 0, 1
+    length_reached, cycles_elapsed, block, cycles_in_block, rows_filled = 0.0, 0.0, 0.0, 0, 1
     arc[0, :] = 0.0
     cycles[0] = 0.0
-    while reached < length and elapsed < most:
+    while length_reached < length and cycles_elapsed < most_cycles:
         kind = order[position]
-        u = reached / spacing
+        u = length_reached / spacing
         row = min(int(u), n_points - 2)
         x = u - row
         largest = 0.0
@@ -115,69 +115,73 @@ def march_places(  # type: ignore[no-untyped-def]
             K = max(K, 0.0)
             zone_size = zone[i] * K * K
             if model > 0 and since[i] + zone_size >= size[i]:
-                since[i], size[i], over[i] = 0.0, zone_size, K
-            low, between = 0, 0.0
+                since[i], size[i], zone_K[i] = 0.0, zone_size, K
+            low, fraction = 0, 0.0
             if model == 2 and K > 0 and since[i] < size[i]:
                 threshold = 0.0
                 for k in range(K_max.shape[0]):
                     at = weight[row, k, i] + x * (weight[row + 1, k, i] - weight[row, k, i])
                     threshold += at * share[k, i, kind]
                 phi = max(0.0, 1.0 - threshold) / (shutoff[i] - 1.0)
-                reduction = phi * (over[i] * np.sqrt(1.0 - since[i] / size[i]) - K)
+                reduction = phi * (zone_K[i] * np.sqrt(1.0 - since[i] / size[i]) - K)
                 place = min(max(reduction / K, 0.0), 1.0) * (n_shifts - 1)
                 low = min(int(place), n_shifts - 2)
-                between = place - low
+                fraction = place - low
             rate = _interpolated_rate(weight, line, x, row, values, is_root, exponent, i, kind, low)
-            if between > 0:
+            if fraction > 0:
                 other = _interpolated_rate(
                     weight, line, x, row, values, is_root, exponent, i, kind, low + 1
                 )
-                rate += between * (other - rate)
+                rate += fraction * (other - rate)
             if model == 1 and since[i] + zone_size < size[i]:
                 rate *= (zone_size / (size[i] - since[i])) ** w[i]
             growth[i] = rate
             largest = max(largest, rate)
-        remaining = min(1.0 - part, most - elapsed)
-        done = remaining
-        if reached + remaining * largest >= length:
-            done = min(remaining, (length - reached) / largest)
-            after = length
+        cycles_left = min(1.0 - part, most_cycles - cycles_elapsed)
+        cycles_done = cycles_left
+        if length_reached + cycles_left * largest >= length:
+            cycles_done = min(cycles_left, (length - length_reached) / largest)
+            length_after = length
         else:
-            after = reached + remaining * largest
-        while filled < n_points and (filled * spacing <= after or after >= length):
-            if filled == n_points - 1 and after < length:
+            length_after = length_reached + cycles_left * largest
+        while rows_filled < n_points and (
+            rows_filled * spacing <= length_after or length_after >= length
+        ):
+            if rows_filled == n_points - 1 and length_after < length:
                 break
             t = (
                 1.0
-                if after == reached
-                else min((filled * spacing - reached) / (after - reached), 1.0)
+                if length_after == length_reached
+                else min(
+                    (rows_filled * spacing - length_reached) / (length_after - length_reached), 1.0
+                )
             )
             for i in range(n):
-                arc[filled, i] = sum_of[i] + t * done * growth[i]
-            cycles[filled] = elapsed + t * done
-            filled += 1
+                arc[rows_filled, i] = sum_of[i] + t * cycles_done * growth[i]
+            cycles[rows_filled] = cycles_elapsed + t * cycles_done
+            rows_filled += 1
         for i in range(n):
-            sum_of[i] += done * growth[i]
-            since[i] += done * growth[i]
-        elapsed += done
-        block += after - reached
-        reached = after
-        part += done
+            sum_of[i] += cycles_done * growth[i]
+            since[i] += cycles_done * growth[i]
+        cycles_elapsed += cycles_done
+        block += length_after - length_reached
+        length_reached = length_after
+        part += cycles_done
         if part >= 1.0 - 1e-12:
             part = 0.0
             position += 1
-            counted += 1
+            cycles_in_block += 1
             if position == n_cycles:
                 position = 0
-            if counted == n_cycles:
-                if block <= least:
+            if cycles_in_block == n_cycles:
+                if block <= least_block:
                     break
-                block, counted = 0.0, 0
-    for g in range(filled, n_points):
+                block, cycles_in_block = 0.0, 0
+    for g in range(rows_filled, n_points):
         for i in range(n):
             arc[g, i] = sum_of[i]
-        cycles[g] = elapsed
-    return reached, position, part, elapsed
+        cycles[g] = cycles_elapsed
+    return length_reached, position, part, cycles_elapsed
 
 
 __all__ = ["march_places"]

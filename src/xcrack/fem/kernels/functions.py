@@ -27,14 +27,14 @@ def set_standard(value, slope, row, bary, gradient, edges):  # type: ignore[no-u
     """
     corners = bary.shape[1]
     d = corners - 1
-    quadratic = len(edges) > 0
+    is_quadratic = len(edges) > 0
     for q in range(len(row)):
         G = gradient[row[q]]
         for b in range(corners):
             x = bary[q, b]
-            value[q, b] = x * (2.0 * x - 1.0) if quadratic else x
+            value[q, b] = x * (2.0 * x - 1.0) if is_quadratic else x
             if len(slope):
-                rise = 4.0 * x - 1.0 if quadratic else 1.0
+                rise = 4.0 * x - 1.0 if is_quadratic else 1.0
                 for j in range(d):
                     slope[q, b, j] = rise * G[b, j]
         for k in range(len(edges)):
@@ -77,7 +77,7 @@ def set_jumps(value, slope, first, row, side, nodes, node_side, number):  # type
 
 
 @kernel
-def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, active, shift):  # type: ignore[no-untyped-def]
+def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, is_active, shift):  # type: ignore[no-untyped-def]
     """Set shifted tip functions times hats from column `first` on, and their gradients.
 
     F = sqrt(r) {cos(t/2), sin(t/2), sin(t/2) sin(t), cos(t/2) sin(t)}, the first k of them.
@@ -98,7 +98,7 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
     gradient : (m, d + 1, d) array
         Gradients of the barycentric coordinates.
     phi, psi : (n,) arrays
-    active : (n,) array of bool
+    is_active : (n,) array of bool
         Points that carry the functions.
     shift : (n, k) array
         The functions at the points.
@@ -107,8 +107,8 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
     d = corners - 1
     k = shift.shape[1]
     slopes = len(slope) > 0
-    F, ahead, normal = np.empty(4), np.empty(4), np.empty(4)
-    to_psi, to_phi, steep = np.empty(d), np.empty(d), np.empty((k, d))
+    F, slope_ahead, normal = np.empty(4), np.empty(4), np.empty(4)
+    to_psi, to_phi, frame_slope = np.empty(d), np.empty(d), np.empty((k, d))
     for p in range(q):
         e = row[p]
         x = 0.0
@@ -118,8 +118,8 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
             y += bary[p, b] * phi[nodes[e, b]]
         r = math.sqrt(x * x + y * y)
         # Between the level set and a kink that the cut follows, the angle goes on beyond pi.
-        beyond = x < 0.0 and -y * side[p] > 1e-9 * r
-        if side[p] != 0 and y * side[p] <= 0.0 and not beyond:
+        is_beyond = x < 0.0 and -y * side[p] > 1e-9 * r
+        if side[p] != 0 and y * side[p] <= 0.0 and not is_beyond:
             y = side[p] * 1e-300
         # Half the angle without trigonometry; the larger of its sine and cosine by the root.
         c, s, C, S = 1.0, 0.0, 1.0, 0.0
@@ -129,13 +129,13 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
                 c = math.sqrt(0.5 * (1.0 + C))
                 s = 0.5 * S / c
             else:
-                s = math.copysign(math.sqrt(0.5 * (1.0 - C)), side[p] if beyond else y)
+                s = math.copysign(math.sqrt(0.5 * (1.0 - C)), side[p] if is_beyond else y)
                 c = 0.5 * S / s
         root = math.sqrt(r)
         F[0], F[1], F[2], F[3] = c, s, s * S, c * S
         if slopes:
-            ahead[0], ahead[1] = -s / 2, c / 2
-            ahead[2], ahead[3] = c * S / 2 + s * C, -s * S / 2 + c * C
+            slope_ahead[0], slope_ahead[1] = -s / 2, c / 2
+            slope_ahead[2], slope_ahead[3] = c * S / 2 + s * C, -s * S / 2 + c * C
             for j in range(d):
                 to_psi[j] = 0.0
                 to_phi[j] = 0.0
@@ -143,25 +143,25 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, ac
                     to_psi[j] += psi[nodes[e, b]] * gradient[e, b, j]
                     to_phi[j] += phi[nodes[e, b]] * gradient[e, b, j]
             for f in range(4):
-                turn = ahead[f]
-                ahead[f] = (0.5 * F[f] * C - turn * S) / root
+                turn = slope_ahead[f]
+                slope_ahead[f] = (0.5 * F[f] * C - turn * S) / root
                 normal[f] = (0.5 * F[f] * S + turn * C) / root
         for f in range(k):
             for j in range(d if slopes else 0):
-                steep[f, j] = ahead[f] * to_psi[j] + normal[f] * to_phi[j]
+                frame_slope[f, j] = slope_ahead[f] * to_psi[j] + normal[f] * to_phi[j]
         for b in range(corners):
             node, to, share = nodes[e, b], first + b * k, bary[p, b]
-            if not active[node]:
+            if not is_active[node]:
                 for f in range(k):
                     value[p, to + f] = 0.0
                     for j in range(d if slopes else 0):
                         slope[p, to + f, j] = 0.0
                 continue
             for f in range(k):
-                lifted = root * F[f] - shift[node, f]
-                value[p, to + f] = share * lifted
+                increment = root * F[f] - shift[node, f]
+                value[p, to + f] = share * increment
                 for j in range(d if slopes else 0):
-                    slope[p, to + f, j] = lifted * gradient[e, b, j] + share * steep[f, j]
+                    slope[p, to + f, j] = increment * gradient[e, b, j] + share * frame_slope[f, j]
 
 
 @kernel
@@ -189,7 +189,7 @@ def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-d
 
 
 @kernel
-def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
+def moments_at(row, bary, corners, is_linear):  # type: ignore[no-untyped-def]
     """1 and, where wanted, the coordinates at points `(q, 1)` or `(q, d + 1)`.
 
     Parameters
@@ -199,13 +199,13 @@ def moments_at(row, bary, corners, linear):  # type: ignore[no-untyped-def]
     bary : (q, d + 1) array
     corners : (m, d + 1, d) array
         Corners of the cells, from their centre and in units of their size.
-    linear : bool
+    is_linear : bool
     """
     d = corners.shape[2]
-    moment = np.empty((len(row), d + 1 if linear else 1))
+    moment = np.empty((len(row), d + 1 if is_linear else 1))
     for q in range(len(row)):
         moment[q, 0] = 1.0
-        if linear:
+        if is_linear:
             for j in range(d):
                 x = 0.0
                 for b in range(d + 1):
@@ -250,7 +250,7 @@ def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # ty
 
 
 @kernel
-def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
+def solve_moments(defect, gram, tolerance):  # type: ignore[no-untyped-def]
     """Multiply the defects of each piece by the pseudo-inverse of its Gram matrix.
 
     By Jacobi rotations, which are as accurate for small eigenvalues as for large ones.
@@ -260,7 +260,7 @@ def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
     defect : (p, f, d, a) array
         Changed in place.
     gram : (p, a, a) array
-    least : float
+    tolerance : float
         Share of the largest eigenvalue up to which others count as zero.
     """
     n = gram.shape[1]
@@ -273,12 +273,12 @@ def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
                 V[i, j] = i == j
                 inverse[i, j] = 0.0
         for _ in range(60):
-            off, size = 0.0, 0.0
+            off_diagonal, size = 0.0, 0.0
             for i in range(n):
                 size += A[i, i] ** 2
                 for j in range(i):
-                    off += A[i, j] ** 2
-            if not off > 1e-34 * size:
+                    off_diagonal += A[i, j] ** 2
+            if not off_diagonal > 1e-34 * size:
                 break
             for i in range(n):
                 for j in range(i):
@@ -301,7 +301,7 @@ def solve_moments(defect, gram, least):  # type: ignore[no-untyped-def]
         for i in range(n):
             largest = max(largest, abs(A[i, i]))
         for k in range(n):
-            if abs(A[k, k]) > least * largest:
+            if abs(A[k, k]) > tolerance * largest:
                 for i in range(n):
                     for j in range(n):
                         inverse[i, j] += V[i, k] * V[j, k] / A[k, k]

@@ -32,20 +32,20 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
             count[nodes[e, a] + 1] += 1
     for i in range(n_nodes):
         count[i + 1] += count[i]
-    around = np.empty(count[n_nodes], np.int64)
+    cells_around = np.empty(count[n_nodes], np.int64)
     place, mark = np.empty(n_nodes, np.int64), np.empty(n_nodes, np.int64)
     for i in range(n_nodes):
         place[i], mark[i] = count[i], -1
     for e in range(m):
         for a in range(n):
             node = nodes[e, a]
-            around[place[node]] = e
+            cells_around[place[node]] = e
             place[node] += 1
     indptr = np.zeros(n_nodes + 1, np.int32)
     for i in range(n_nodes):
         entries = 0
         for k in range(count[i], count[i + 1]):
-            e = around[k]
+            e = cells_around[k]
             for a in range(n):
                 if mark[nodes[e, a]] != i:
                     mark[nodes[e, a]] = i
@@ -56,7 +56,7 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
     indices = np.empty(indptr[n_nodes], np.int32)
     for i in range(n_nodes):
         for k in range(count[i], count[i + 1]):
-            e = around[k]
+            e = cells_around[k]
             for a in range(n):
                 node = nodes[e, a]
                 if mark[node] != n_nodes + i:
@@ -134,10 +134,10 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
     G = np.empty((n, d))
     both = lam + 2.0 * mu
     for e in cells:
-        touched = False
+        is_touched = False
         for a in range(n):
-            touched |= low <= slot[e, a, 0] < high
-        if not touched:
+            is_touched |= low <= slot[e, a, 0] < high
+        if not is_touched:
             continue
         for q in range(len(weight)):
             w = weight[q] * volume[e]
@@ -282,7 +282,7 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
                 count[functions[e, a] + 1] += 1
     for i in range(n_functions):
         count[i + 1] += count[i]
-    around = np.empty(count[n_functions], np.int64)
+    cells_around = np.empty(count[n_functions], np.int64)
     place, mark = np.empty(n_functions, np.int64), np.empty(n_functions, np.int64)
     for i in range(n_functions):
         place[i], mark[i] = count[i], -1
@@ -290,13 +290,13 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
         for a in range(n):
             f = functions[e, a]
             if f >= 0:
-                around[place[f]] = e
+                cells_around[place[f]] = e
                 place[f] += 1
     indptr = np.zeros(n_functions + 1, np.int64)
     for i in range(n_functions):
         entries = 0
         for k in range(count[i], count[i + 1]):
-            e = around[k]
+            e = cells_around[k]
             for a in range(n):
                 f = functions[e, a]
                 if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != i:
@@ -308,7 +308,7 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
     indices = np.empty(indptr[n_functions], np.int32)
     for i in range(n_functions):
         for k in range(count[i], count[i + 1]):
-            e = around[k]
+            e = cells_around[k]
             for a in range(n):
                 f = functions[e, a]
                 if f >= 0 and (f >= n_standard or i >= n_standard) and mark[f] != n_functions + i:
@@ -333,79 +333,79 @@ def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
 @kernel
 def _set_active_places(functions, n_standard, place):  # type: ignore[no-untyped-def]
     """Set the places of the functions of a cell; their number, and that of standard ones."""
-    active, plain = 0, 0  # standard functions come first
+    n_active, n_std = 0, 0  # standard functions come first
     for a in range(len(functions)):
         if functions[a] >= 0:
-            place[active] = a
-            active += 1
+            place[n_active] = a
+            n_active += 1
             if functions[a] < n_standard:
-                plain = active
-    return active, plain
+                n_std = n_active
+    return n_active, n_std
 
 
 @kernel
-def _products(begin, end, weight, gradient, place, active, plain, row, block):  # type: ignore[no-untyped-def]
+def _products(begin, end, weight, gradient, place, n_active, n_std, row, block):  # type: ignore[no-untyped-def]
     """Integrals of G_ai G_bj over the points of a cell, b >= a, b enriched."""
     d = gradient.shape[2]
-    for k in range(active * d):
-        for j in range(active * d):
+    for k in range(n_active * d):
+        for j in range(n_active * d):
             block[k, j] = 0.0
     for q in range(begin, end):
-        for a in range(active):
+        for a in range(n_active):
             for i in range(d):
                 row[a * d + i] = gradient[q, place[a], i]
-        for a in range(active):
-            start = d * max(a, plain)
+        for a in range(n_active):
+            start = d * max(a, n_std)
             for i in range(d):
-                scaled = weight[q] * row[a * d + i]
+                factor = weight[q] * row[a * d + i]
                 line = block[a * d + i]
-                for k in range(start, active * d):
-                    line[k] += scaled * row[k]
+                for k in range(start, n_active * d):
+                    line[k] += factor * row[k]
 
 
 @kernel
-def _products_by_blas(begin, end, weight, gradient, place, active, rows, block):  # type: ignore[no-untyped-def]
+def _products_by_blas(begin, end, weight, gradient, place, n_active, rows, block):  # type: ignore[no-untyped-def]
     """The same products as those of rows of gradients times the root of the weight, by dsyrk."""
     d, width = gradient.shape[2], block.shape[1]
-    k = active * d
+    k = n_active * d
     for q in range(begin, end):
         root, at = math.sqrt(weight[q]), (q - begin) * k
-        for a in range(active):
+        for a in range(n_active):
             for i in range(d):
                 rows[at + a * d + i] = root * gradient[q, place[a], i]
-    size, scalar, letter = np.empty(3, np.int32), np.empty(2), np.empty(2, np.uint8)
+    size, factors, letter = np.empty(3, np.int32), np.empty(2), np.empty(2, np.uint8)
     size[0], size[1], size[2] = k, end - begin, width
-    scalar[0], scalar[1] = 1.0, 0.0
+    factors[0], factors[1] = 1.0, 0.0
     letter[0], letter[1] = 76, 78  # L N
-    integer, real, text = size.ctypes.data, scalar.ctypes.data, letter.ctypes.data
+    integer, factor_pointer, text = size.ctypes.data, factors.ctypes.data, letter.ctypes.data
     dsyrk(
         text,
         text + 1,
         integer,
         integer + 4,
-        real,
+        factor_pointer,
         rows.ctypes.data,
         integer,
-        real + 8,
+        factor_pointer + 8,
         block.ctypes.data,
         integer + 8,
     )
-    for a in range(active):
+    for a in range(n_active):
         for i in range(d):
             for j in range(i):
                 block[a * d + i, a * d + j] = block[a * d + j, a * d + i]
-    return size[0] + letter[0] + scalar[0]  # addresses alone keep no array alive
+    return size[0] + letter[0] + factors[0]  # addresses alone keep no array alive
 
 
 @kernel
 def _scatter(  # type: ignore[no-untyped-def]
-    data, indptr, indices, functions, place, at, active, plain, block, lam, mu, remainder
+    data, indptr, indices, functions, place, at, n_active, n_std, block, lam, mu, remainder
 ):
     """Add the stiffness that follows from the products of a cell, in which functions stand `at`."""
     d = data.shape[1]
-    for a in range(active):
+    for a in range(n_active):
         fa, k = functions[place[a]], at[a] * d
-        for b in range(max(a, plain), active):
+        for b in range(max(a, n_std), n_active):
             fb, m = functions[place[b]], at[b] * d
             one, other = _slot(indptr, indices, fa, fb), _slot(indptr, indices, fb, fa)
             trace = 0.0
@@ -457,27 +457,38 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     block, row = np.zeros((n * d, n * d)), np.empty(n * d)
     for a in range(n):
         at[a] = a
-    most = 0
+    most_points = 0
     for e in range(m):
-        most = max(most, offsets[e + 1] - offsets[e])
-    rows = np.empty(most * n * d)
+        most_points = max(most_points, offsets[e + 1] - offsets[e])
+    rows = np.empty(most_points * n * d)
     for e in range(m):
-        active, plain = _set_active_places(functions[e], n_standard, place)
+        n_active, n_std = _set_active_places(functions[e], n_standard, place)
         begin, end = offsets[e], offsets[e + 1]
-        least = 0.0
+        least_weight = 0.0
         for q in range(begin, end):
-            least = min(least, weight[q])
-        if least < 0.0:
-            _products(begin, end, weight, gradient, place, active, plain, row, block)
+            least_weight = min(least_weight, weight[q])
+        if least_weight < 0.0:
+            _products(begin, end, weight, gradient, place, n_active, n_std, row, block)
         else:
-            _products_by_blas(begin, end, weight, gradient, place, active, rows, block)
+            _products_by_blas(begin, end, weight, gradient, place, n_active, rows, block)
         _scatter(
-            data, indptr, indices, functions[e], place, at, active, plain, block, lam, mu, remainder
+            data,
+            indptr,
+            indices,
+            functions[e],
+            place,
+            at,
+            n_active,
+            n_std,
+            block,
+            lam,
+            mu,
+            remainder,
         )
 
 
 @kernel
-def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-untyped-def]
+def gradient_products(offsets, weight, gradient, n_std):  # type: ignore[no-untyped-def]
     """Integrals of G_ai G_bj in cells, from which their stiffness follows for any material.
 
     Parameters
@@ -486,7 +497,7 @@ def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-unty
         Points of each cell.
     weight : (q,) array
     gradient : (q, n, d) array
-    plain : int
+    n_std : int
         Leading functions that are standard ones: their products are left out.
 
     Returns
@@ -500,7 +511,7 @@ def gradient_products(offsets, weight, gradient, plain):  # type: ignore[no-unty
         place[a] = a
     result = np.empty((m, n * d, n * d))
     for e in range(m):
-        _products(offsets[e], offsets[e + 1], weight, gradient, place, n, plain, row, result[e])
+        _products(offsets[e], offsets[e + 1], weight, gradient, place, n, n_std, row, result[e])
     return result
 
 
@@ -519,9 +530,9 @@ def add_products(  # type: ignore[no-untyped-def]
     m, n = functions.shape
     place = np.empty(n, np.int64)
     for e in range(m):
-        active, plain = _set_active_places(functions[e], n_standard, place)
+        n_active, n_std = _set_active_places(functions[e], n_standard, place)
         block = products[e]
         _scatter(
-            data, indptr, indices, functions[e], place, place, active, plain, block, lam, mu,
+            data, indptr, indices, functions[e], place, place, n_active, n_std, block, lam, mu,
             remainder,
         )  # fmt: skip

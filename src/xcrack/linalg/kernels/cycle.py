@@ -91,16 +91,16 @@ def fill_blocks(indptr, indices, data, first, start, size, offset, n_columns, sh
                 columns[m] = column
                 m += 1
         _sort(columns, start[g], m)
-        left, whole = size[g]
+        n_standard, n_members = size[g]
         for k in range(start[g], m):
-            place[columns[k]] = left + k - start[g]
+            place[columns[k]] = n_standard + k - start[g]
             columns[k] += np.uint32(shift)
         n_rows = first[g + 1] - first[g]
         for i in range(n_rows):
             row = first[g] + i
-            base, stride = offset[g] + i * whole, 1
+            base, stride = offset[g] + i * n_members, 1
             if i < n_rows - n_rows % 3:
-                base, stride = offset[g] + (i - i % 3) * whole + i % 3, 3
+                base, stride = offset[g] + (i - i % 3) * n_members + i % 3, 3
             for k in range(indptr[row], indptr[row + 1]):
                 values[base + stride * place[indices[k]]] += data[k]
 

@@ -81,16 +81,16 @@ def _add_update(panel, update, source, is_packed, places, m, k, run):  # type: i
             run[runs] = j
             runs += 1
     run[runs] = b
-    before = 0
+    n_before = 0
     for j in range(b):
-        if j == run[before + 1]:
-            before += 1
+        if j == run[n_before + 1]:
+            n_before += 1
         c = places[j]
         column = panel + np.uint64(8 * c * m)
         if c >= k:
             column = update + np.uint64(8 * (c - k) * (m - k)) - np.uint64(8 * k)
         i = j
-        for r in range(before, runs):
+        for r in range(n_before, runs):
             _add_stretch(
                 column + np.uint64(8 * places[i]), source + np.uint64(8 * i), run[r + 1] - i
             )
@@ -126,12 +126,12 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
     for t in range(parts):
         longest = max(longest, begin[t + 1] - begin[t])
     run = np.empty(longest + 1, np.int64)
-    size, scalar, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
-    scalar[0], scalar[1] = 1.0, -1.0
+    size, factors, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
+    factors[0], factors[1] = 1.0, -1.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R
-    lower, plain = letter.ctypes.data, letter.ctypes.data + 1
-    transposed, right = lower + 2, lower + 3
-    one, minus = scalar.ctypes.data, scalar.ctypes.data + 8
+    lower, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
+    transpose, right_side = lower + 2, lower + 3
+    one, minus_one = factors.ctypes.data, factors.ctypes.data + 8
     rows, pivots, rest, info = (
         size.ctypes.data,
         size.ctypes.data + 4,
@@ -149,9 +149,11 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
             for e in range(start[low + j], start[low + j + 1]):
                 L[j * m + row[e]] = value[e]
         for j in range(b):
-            below = numba.carray(doubles_at(square[t] + np.uint64(8 * j * (b + 1))), (b - j,))
+            square_column = numba.carray(
+                doubles_at(square[t] + np.uint64(8 * j * (b + 1))), (b - j,)
+            )
             for i in range(b - j):
-                below[i] = 0.0
+                square_column[i] = 0.0
         p = order[t]
         if 2 * p <= parts:
             for child in (rank[2 * p], rank[2 * p + 1]):
@@ -159,7 +161,7 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
                 places = in_parent[begin[child] : begin[child + 1]]
                 _add_update(panel[t], square[t], source, is_packed[child], places, m, k, run)
         size[0], size[1], size[2] = m, k, b
-        beyond = panel[t] + np.uint64(8 * k)
+        panel_below = panel[t] + np.uint64(8 * k)
         if k <= _NARROW:
             if _factored_panel(panel[t], m, k) != 0:
                 return 1
@@ -169,24 +171,49 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
                 return 1
             if b > 0:
                 dtrsm(
-                    right, lower, transposed, plain, rest, pivots, one, panel[t], rows, beyond, rows
+                    right_side,
+                    lower,
+                    transpose,
+                    no_transpose,
+                    rest,
+                    pivots,
+                    one,
+                    panel[t],
+                    rows,
+                    panel_below,
+                    rows,
                 )
         if m <= _SMALL:
             for c in range(b):
                 target = square[t] + np.uint64(8 * c * (b + 1))
-                _subtract_products(target, beyond + np.uint64(8 * c), np.uint64(8 * m), k, b - c)
+                _subtract_products(
+                    target, panel_below + np.uint64(8 * c), np.uint64(8 * m), k, b - c
+                )
         elif k > 0 and b > 0:
-            dsyrk(lower, plain, rest, pivots, minus, beyond, rows, one, square[t], rest)
+            dsyrk(
+                lower,
+                no_transpose,
+                rest,
+                pivots,
+                minus_one,
+                panel_below,
+                rows,
+                one,
+                square[t],
+                rest,
+            )
         if is_packed[t]:
-            packed = numba.carray(doubles_at(update[t]), (b * (b + 1) // 2,))
+            packed_update = numba.carray(doubles_at(update[t]), (b * (b + 1) // 2,))
             to = 0
             for j in range(b):
-                below = numba.carray(doubles_at(square[t] + np.uint64(8 * j * (b + 1))), (b - j,))
+                square_column = numba.carray(
+                    doubles_at(square[t] + np.uint64(8 * j * (b + 1))), (b - j,)
+                )
                 for i in range(b - j):
-                    packed[to + i] = below[i]
+                    packed_update[to + i] = square_column[i]
                 to += b - j
     # Addresses alone keep no array alive: numba frees it after its last use.
-    return 0 if letter[0] == 76 and scalar[0] == 1.0 else 2
+    return 0 if letter[0] == 76 and factors[0] == 1.0 else 2
 
 
 @kernel
@@ -201,18 +228,22 @@ def copy_stretches(source, target, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def substituted_one(first, begin, boundary, panel, x, forward, backward):  # type: ignore[no-untyped-def]
+def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward):  # type: ignore[no-untyped-def]
     """Solve for one right-hand side `(n,)`, in place; see `substitute`."""
     parts, largest = len(first) - 1, 1
     for t in range(parts):
         largest = max(largest, begin[t + 1] - begin[t])
     B = np.empty(largest)
-    size, scalar, letter = np.empty(4, np.int32), np.empty(3), np.empty(3, np.uint8)
+    size, factors, letter = np.empty(4, np.int32), np.empty(3), np.empty(3, np.uint8)
     size[3] = 1
-    scalar[0], scalar[1], scalar[2] = 1.0, -1.0, 0.0
+    factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
     letter[0], letter[1], letter[2] = 76, 78, 84  # L N T
-    lower, plain, transposed = letter.ctypes.data, letter.ctypes.data + 1, letter.ctypes.data + 2
-    one, minus, zero = scalar.ctypes.data, scalar.ctypes.data + 8, scalar.ctypes.data + 16
+    lower, no_transpose, transpose = (
+        letter.ctypes.data,
+        letter.ctypes.data + 1,
+        letter.ctypes.data + 2,
+    )
+    one, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
     pivots, rows, rest, step = (
         size.ctypes.data,
         size.ctypes.data + 4,
@@ -220,16 +251,16 @@ def substituted_one(first, begin, boundary, panel, x, forward, backward):  # typ
         size.ctypes.data + 12,
     )
     x0, b0 = x.ctypes.data, B.ctypes.data
-    for t in range(parts if forward else 0):
+    for t in range(parts if is_forward else 0):
         low, q = first[t], begin[t]
         k, b = first[t + 1] - low, begin[t + 1] - q
         if k == 0:
             continue
         size[0], size[1], size[2] = k, k + b, b
-        dtrsv(lower, plain, plain, pivots, panel[t], rows, x0 + 8 * low, step)
+        dtrsv(lower, no_transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
         if b > 0:
             dgemv(
-                plain,
+                no_transpose,
                 rest,
                 pivots,
                 one,
@@ -243,7 +274,7 @@ def substituted_one(first, begin, boundary, panel, x, forward, backward):  # typ
             )
             for i in range(b):
                 x[boundary[q + i]] -= B[i]
-    for t in range(parts - 1 if backward else -1, -1, -1):
+    for t in range(parts - 1 if is_backward else -1, -1, -1):
         low, q = first[t], begin[t]
         k, b = first[t + 1] - low, begin[t + 1] - q
         if k == 0:
@@ -253,10 +284,10 @@ def substituted_one(first, begin, boundary, panel, x, forward, backward):  # typ
             for i in range(b):
                 B[i] = x[boundary[q + i]]
             dgemv(
-                transposed,
+                transpose,
                 rest,
                 pivots,
-                minus,
+                minus_one,
                 panel[t] + np.uint64(8 * k),
                 rows,
                 b0,
@@ -265,12 +296,12 @@ def substituted_one(first, begin, boundary, panel, x, forward, backward):  # typ
                 x0 + 8 * low,
                 step,
             )
-        dtrsv(lower, transposed, plain, pivots, panel[t], rows, x0 + 8 * low, step)
-    return letter[0] == 76 and scalar[0] == 1.0  # which keeps both alive until here
+        dtrsv(lower, transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
+    return letter[0] == 76 and factors[0] == 1.0  # which keeps both alive until here
 
 
 @kernel
-def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, backward):  # type: ignore[no-untyped-def]
+def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_forward, is_backward):  # type: ignore[no-untyped-def]
     """Solve with the factor, in place.
 
     Parameters
@@ -279,19 +310,19 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
         Of the factor.
     X : (n, r) array
         Right-hand sides in permuted order.
-    touched : (parts,) array of bool
+    is_touched : (parts,) array of bool
         Parts whose rows of the right-hand sides are not zero; ancestors are added in the forward
         half, and all parts count in the backward one.
-    forward, backward : bool
+    is_forward, is_backward : bool
         Halves to do: L^-1 X, and L^-T of that.
     """
     parts, r = len(order), X.shape[1]
-    size, scalar, letter = np.empty(4, np.int32), np.empty(3), np.empty(4, np.uint8)
-    scalar[0], scalar[1], scalar[2] = 1.0, -1.0, 0.0
+    size, factors, letter = np.empty(4, np.int32), np.empty(3), np.empty(4, np.uint8)
+    factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82
-    lower, plain = letter.ctypes.data, letter.ctypes.data + 1
-    transposed, right = lower + 2, lower + 3
-    one, minus, zero = scalar.ctypes.data, scalar.ctypes.data + 8, scalar.ctypes.data + 16
+    lower, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
+    transpose, right_side = lower + 2, lower + 3
+    one, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
     columns, pivots, rows, rest = (
         size.ctypes.data,
         size.ctypes.data + 4,
@@ -304,13 +335,13 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
     B = np.empty((largest, r))
     size[0] = r
     x0, b0 = X.ctypes.data, B.ctypes.data
-    if forward:
+    if is_forward:
         for t in range(parts):
-            if not touched[t]:
+            if not is_touched[t]:
                 continue
             p = order[t]
             if p > 1:
-                touched[rank[p >> 1]] = True
+                is_touched[rank[p >> 1]] = True
             low, at, q = first[t], panel[t], begin[t]
             k, b = first[t + 1] - low, begin[t + 1] - q
             m = k + b
@@ -319,10 +350,10 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
             size[1], size[2], size[3] = k, m, b
             # Rows of X, (k, r) in C order, are a matrix (r, k) by columns: X <- X L^-T.
             dtrsm(
-                right,
+                right_side,
                 lower,
-                transposed,
-                plain,
+                transpose,
+                no_transpose,
                 columns,
                 pivots,
                 one,
@@ -333,8 +364,8 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
             )
             if b > 0:
                 dgemm(
-                    plain,
-                    transposed,
+                    no_transpose,
+                    transpose,
                     columns,
                     rest,
                     pivots,
@@ -351,7 +382,7 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
                     g = boundary[q + i]
                     for c in range(r):
                         X[g, c] -= B[i, c]
-    if backward:
+    if is_backward:
         for t in range(parts - 1, -1, -1):
             low, at, q = first[t], panel[t], begin[t]
             k, b = first[t + 1] - low, begin[t + 1] - q
@@ -365,12 +396,12 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
                     for c in range(r):
                         B[i, c] = X[g, c]
                 dgemm(
-                    plain,
-                    plain,
+                    no_transpose,
+                    no_transpose,
                     columns,
                     pivots,
                     rest,
-                    minus,
+                    minus_one,
                     b0,
                     columns,
                     at + np.uint64(8 * k),
@@ -380,10 +411,10 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
                     columns,
                 )
             dtrsm(
-                right,
+                right_side,
                 lower,
-                plain,
-                plain,
+                no_transpose,
+                no_transpose,
                 columns,
                 pivots,
                 one,
@@ -392,53 +423,53 @@ def substitute(first, begin, boundary, order, rank, panel, X, touched, forward, 
                 x0 + 8 * low * r,
                 columns,
             )
-    return letter[0] == 76 and scalar[0] == 1.0  # which keeps both alive until here
+    return letter[0] == 76 and factors[0] == 1.0  # which keeps both alive until here
 
 
 @kernel
-def _cut(ranked, centre, cells, low, high, last, visit, begins):  # type: ignore[no-untyped-def]
+def _cut(ranking, centre, cells, low, high, last, visit, begin_of_point):  # type: ignore[no-untyped-def]
     """Axis and place of a cut near the middle of some cells, with the fewest points on it.
 
     `last` is the last cell of each point, `visit` the latest look at it and, at its end, how many
-    looks there were, `begins` the number of points that come with each cell.
+    looks there were, `begin_of_point` the number of points that come with each cell.
     """
-    half, widest = low + (high - low) // 2, 0.0
-    axis, place, least = 0, half, np.inf
-    for i in range(len(ranked)):
-        widest = max(widest, centre[ranked[i, high - 1], i] - centre[ranked[i, low], i])
+    half, width = low + (high - low) // 2, 0.0
+    axis, place, lowest_price = 0, half, np.inf
+    for i in range(len(ranking)):
+        width = max(width, centre[ranking[i, high - 1], i] - centre[ranking[i, low], i])
     slack = int(_SLACK * (high - low))
-    for i in range(len(ranked)):
-        if centre[ranked[i, high - 1], i] - centre[ranked[i, low], i] < 0.5 * widest:
+    for i in range(len(ranking)):
+        if centre[ranking[i, high - 1], i] - centre[ranking[i, low], i] < 0.5 * width:
             continue
         visit[-1] += 1
         for k in range(low, high):
-            begins[k] = 0
+            begin_of_point[k] = 0
             for j in range(cells.shape[1]):
-                point = cells[ranked[i, k], j]
+                point = cells[ranking[i, k], j]
                 last[point] = k
                 if visit[point] != visit[-1]:
                     visit[point] = visit[-1]
-                    begins[k] += 1
+                    begin_of_point[k] += 1
         points = 0  # that have cells on both sides of the cut behind cell k
         for k in range(low, half + slack):
-            points += begins[k]
+            points += begin_of_point[k]
             for j in range(cells.shape[1]):
-                points -= last[cells[ranked[i, k], j]] == k
-            off = abs(k + 1 - half)
-            if off <= slack:
-                price = points * (1.0 + 4.0 * (off / (high - low)) ** 2)
-                if price < least or (price == least and off < abs(place - half)):
-                    axis, place, least = i, k + 1, price
+                points -= last[cells[ranking[i, k], j]] == k
+            distance = abs(k + 1 - half)
+            if distance <= slack:
+                price = points * (1.0 + 4.0 * (distance / (high - low)) ** 2)
+                if price < lowest_price or (price == lowest_price and distance < abs(place - half)):
+                    axis, place, lowest_price = i, k + 1, price
     return axis, place
 
 
 @kernel
-def bisect_cells(ranked, centre, cells, n_points, depth):  # type: ignore[no-untyped-def]
+def bisect_cells(ranking, centre, cells, n_points, depth):  # type: ignore[no-untyped-def]
     """Leaf of each cell after halving across a long side, where few points lie on the cut.
 
     Parameters
     ----------
-    ranked : (d, n) array of int
+    ranking : (d, n) array of int
         Cells in the order of each coordinate. It is changed.
     centre : (n, d) array
     cells : (n, d + 1) array of int
@@ -451,14 +482,14 @@ def bisect_cells(ranked, centre, cells, n_points, depth):  # type: ignore[no-unt
     (n,) array of int
         Number 0 to 2^depth - 1.
     """
-    d, n = ranked.shape
+    d, n = ranking.shape
     last, visit = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
-    begins = np.empty(n, dtype=np.int64)
+    begin_of_point = np.empty(n, dtype=np.int64)
     leaf = np.empty(n, dtype=np.int64)
     low, high = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     high[0] = n
     lower = np.empty(n, dtype=np.bool_)
-    spare = np.empty(n, dtype=np.int64)
+    buffer = np.empty(n, dtype=np.int64)
     for _ in range(depth):
         m = len(low)
         new_low, new_high = np.empty(2 * m, dtype=np.int64), np.empty(2 * m, dtype=np.int64)
@@ -466,31 +497,31 @@ def bisect_cells(ranked, centre, cells, n_points, depth):  # type: ignore[no-unt
             a, b = low[g], high[g]
             half, axis = a + (b - a) // 2, 0
             if b - a > 1:
-                axis, half = _cut(ranked, centre, cells, a, b, last, visit, begins)
+                axis, half = _cut(ranking, centre, cells, a, b, last, visit, begin_of_point)
             new_low[2 * g], new_high[2 * g] = a, half
             new_low[2 * g + 1], new_high[2 * g + 1] = half, b
             if b - a < 2:
                 continue
             for k in range(a, b):
-                lower[ranked[axis, k]] = k < half
+                lower[ranking[axis, k]] = k < half
             for i in range(d):
                 if i == axis:
                     continue
                 one, other = a, 0
                 for k in range(a, b):
-                    c = ranked[i, k]
+                    c = ranking[i, k]
                     if lower[c]:
-                        ranked[i, one] = c
+                        ranking[i, one] = c
                         one += 1
                     else:
-                        spare[other] = c
+                        buffer[other] = c
                         other += 1
                 for k in range(other):
-                    ranked[i, one + k] = spare[k]
+                    ranking[i, one + k] = buffer[k]
         low, high = new_low, new_high
     for g in range(len(low)):
         for k in range(low[g], high[g]):
-            leaf[ranked[0, k]] = g
+            leaf[ranking[0, k]] = g
     return leaf
 
 
@@ -555,15 +586,15 @@ def postorder(depth):  # type: ignore[no-untyped-def]
     order, rank = np.empty(count, dtype=np.int64), np.zeros(count + 1, dtype=np.int64)
     # The subtree of a part with h levels below it takes 2^(h + 1) - 1 places, its own last.
     begin = np.zeros(count + 1, dtype=np.int64)
-    below = depth
+    depth_below = depth
     for p in range(1, count + 1):
-        if p >= (2 << (depth - below)):
-            below -= 1
-        rank[p] = begin[p] + (2 << below) - 2
+        if p >= (2 << (depth - depth_below)):
+            depth_below -= 1
+        rank[p] = begin[p] + (2 << depth_below) - 2
         order[rank[p]] = p
-        if below > 0:
+        if depth_below > 0:
             begin[2 * p] = begin[p]
-            begin[2 * p + 1] = begin[p] + (1 << below) - 1
+            begin[2 * p + 1] = begin[p] + (1 << depth_below) - 1
     return order, rank
 
 
@@ -626,10 +657,10 @@ def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # ty
         low, high, top = first[t], first[t + 1], begin[t]
         if top + n > capacity:
             capacity = 2 * capacity + n
-            wider, wider_map = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
+            longer_boundary, wider_map = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
             for k in range(top):
-                wider[k], wider_map[k] = boundary[k], in_parent[k]
-            boundary, in_parent = wider, wider_map
+                longer_boundary[k], wider_map[k] = boundary[k], in_parent[k]
+            boundary, in_parent = longer_boundary, wider_map
         for c in range(low, high):
             for k in range(indptr[perm[c]], indptr[perm[c] + 1]):
                 i = place[indices[k]]
@@ -705,13 +736,13 @@ def places_of_squares(order, rank, begin, height, is_packed, level):  # type: ig
         Entries that the stacks of a subtree take, and those above the subtrees.
     """
     place = np.zeros(len(order), dtype=np.int64)
-    top, most = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
+    top, most_room = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
     for t in range(len(order)):
         p, h = order[t], height[t]
         stack = 2 * (h > level) + h % 2
         place[t] = top[stack]
         size = (begin[t + 1] - begin[t]) ** 2
-        most[stack] = max(most[stack], top[stack] + size)
+        most_room[stack] = max(most_room[stack], top[stack] + size)
         if h > 0:
             for child in (rank[2 * p], rank[2 * p + 1]):
                 if not is_packed[child]:
@@ -720,21 +751,21 @@ def places_of_squares(order, rank, begin, height, is_packed, level):  # type: ig
             top[stack] += size
     for t in range(len(order)):
         if height[t] % 2 == 1:
-            place[t] += most[2 * (height[t] > level)]
-    return place, most[0] + most[1], most[2] + most[3]
+            place[t] += most_room[2 * (height[t] > level)]
+    return place, most_room[0] + most_room[1], most_room[2] + most_room[3]
 
 
 @kernel
-def unchanged_parts(fronts, before):  # type: ignore[no-untyped-def]
+def unchanged_parts(fronts, previous):  # type: ignore[no-untyped-def]
     """Parts whose entries and whose children's places are the same bits as before `(parts,)`.
 
     Parameters
     ----------
-    fronts, before : tuples of arrays
+    fronts, previous : tuples of arrays
         first, begin, in_parent, start, row, value, order, rank.
     """
     first, begin, in_parent, start, row, value, order, rank = fronts
-    first0, begin0, in_parent0, start0, row0, value0 = before[:6]
+    first0, begin0, in_parent0, start0, row0, value0 = previous[:6]
     parts = len(order)
     is_unchanged = np.zeros(parts, dtype=np.bool_)
     bits, bits0 = value.view(np.uint64), value0.view(np.uint64)
@@ -744,28 +775,28 @@ def unchanged_parts(fronts, before):  # type: ignore[no-untyped-def]
             continue
         low, low0 = start[first[t]], start0[first0[t]]
         count = start[first[t + 1]] - low
-        alike = count == start0[first0[t + 1]] - low0
-        if alike:
+        is_same = count == start0[first0[t + 1]] - low0
+        if is_same:
             for j in range(k):
                 c, c0 = first[t] + j, first0[t] + j
                 if start[c + 1] - start[c] != start0[c0 + 1] - start0[c0]:
-                    alike = False
+                    is_same = False
                     break
-        if alike:
+        if is_same:
             for i in range(count):
                 if row[low + i] != row0[low0 + i] or bits[low + i] != bits0[low0 + i]:
-                    alike = False
+                    is_same = False
                     break
         p = order[t]
-        if alike and 2 * p <= parts:
+        if is_same and 2 * p <= parts:
             for child in (rank[2 * p], rank[2 * p + 1]):
                 count = begin[child + 1] - begin[child]
                 if count != begin0[child + 1] - begin0[child]:
-                    alike = False
+                    is_same = False
                     break
                 for i in range(count):
                     if in_parent[begin[child] + i] != in_parent0[begin0[child] + i]:
-                        alike = False
+                        is_same = False
                         break
-        is_unchanged[t] = alike
+        is_unchanged[t] = is_same
     return is_unchanged

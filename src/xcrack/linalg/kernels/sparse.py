@@ -79,7 +79,9 @@ def residual(indptr, indices, data, x, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bordered_matrix(indptr, indices, data, Z, across, down, corner_block, fixed, first):  # type: ignore[no-untyped-def]
+def bordered_matrix(  # type: ignore[no-untyped-def]
+    indptr, indices, data, Z, coupling, coupling_of_columns, corner_block, is_fixed, first
+):
     """A symmetric matrix in a basis of its first unknowns and of enriched columns.
 
     Columns are scaled to energy one. Standard unknowns that are fixed or have no energy are left
@@ -89,9 +91,9 @@ def bordered_matrix(indptr, indices, data, Z, across, down, corner_block, fixed,
     ----------
     indptr, indices, data : CSR arrays of K, (n, n)
     Z : tuple of CSR arrays, (n, m)
-    across, down, corner_block : tuples of CSR arrays, (n, m), (m, n), (m, m)
+    coupling, coupling_of_columns, corner_block : tuples of CSR arrays, (n, m), (m, n), (m, m)
         K Z, its transpose, and Zᵀ K Z; sorted.
-    fixed : (n,) array of bool
+    is_fixed : (n,) array of bool
     first : int
         Number of standard unknowns.
 
@@ -105,8 +107,8 @@ def bordered_matrix(indptr, indices, data, Z, across, down, corner_block, fixed,
         and call again.
     """
     Z_start, Z_column, Z_value = Z
-    across_start, across_column, across_value = across
-    down_start, down_row, down_value = down
+    across_start, across_column, across_value = coupling
+    down_start, down_row, down_value = coupling_of_columns
     own_start, own_column, own_value = corner_block
     n, m = len(indptr) - 1, len(own_start) - 1
     energy = np.zeros(m)
@@ -122,7 +124,7 @@ def bordered_matrix(indptr, indices, data, Z, across, down, corner_block, fixed,
         for k in range(indptr[i], indptr[i + 1]):
             if indices[k] == i:
                 energy_i = data[k]
-        if energy_i > 0 and not fixed[i]:
+        if energy_i > 0 and not is_fixed[i]:
             number[i] = count
             scale[count] = 1 / np.sqrt(energy_i)
             count += 1
@@ -226,7 +228,7 @@ def dense_blocks(indptr, indices, data, members, offsets):  # type: ignore[no-un
 
 @kernel
 def orthonormal_columns(  # type: ignore[no-untyped-def]
-    indptr, indices, data, members, offsets, n_standard, least
+    indptr, indices, data, members, offsets, n_standard, tolerance
 ):
     """Columns that replace the enriched unknowns of blocks, orthonormal in the energy of K.
 
@@ -239,7 +241,7 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
     members, offsets : arrays of int
         As of `dense_blocks`; standard unknowns first.
     n_standard : (b,) array of int
-    least : float
+    tolerance : float
         Share of the largest eigenvalue of a block up to which others are dropped.
 
     Returns
@@ -249,25 +251,25 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
         k; -1 where a block cannot be factored.
     """
     n, blocks = len(indptr) - 1, len(offsets) - 1
-    widest, room = 0, 0
+    width, room = 0, 0
     for b in range(blocks):
         size = offsets[b + 1] - offsets[b]
-        if size > widest:
-            widest = size
+        if size > width:
+            width = size
         room += size * (size - n_standard[b])
     place = np.empty(n, np.int64)
     for i in range(n):
         place[i] = -1
-    k, Z = np.empty((widest, widest)), np.empty(room)
-    Q, C = np.empty(widest * widest), np.empty(widest * widest)
-    ss, w, D = np.empty(widest * widest), np.empty(widest), np.empty(widest)
-    work, pivots = np.empty(34 * widest + 1), np.empty(widest + 1, np.int32)
+    k, Z = np.empty((width, width)), np.empty(room)
+    Q, C = np.empty(width * width), np.empty(width * width)
+    ss, w, D = np.empty(width * width), np.empty(width), np.empty(width)
+    work, pivots = np.empty(34 * width + 1), np.empty(width + 1, np.int32)
     sizes, letters = np.empty(4, np.int32), np.empty(2, np.uint8)
     sizes[2] = len(work)
     letters[0], letters[1] = 86, 76  # V L
     at = sizes.ctypes.data
     start = np.zeros(n + 1, np.int32)
-    begin, failed = 0, False
+    begin, has_failed = 0, False
     for b in range(blocks):
         first, last = offsets[b], offsets[b + 1]
         size, s = last - first, n_standard[b]
@@ -296,7 +298,7 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
             dgesv(
                 at, at + 4, ss.ctypes.data, at, pivots.ctypes.data, C.ctypes.data, at, at + 12
             )  # fmt: skip
-            failed = failed or sizes[3] != 0
+            has_failed = has_failed or sizes[3] != 0
         for j in range(e):
             D[j] = 1 / np.sqrt(k[s + j, s + j]) if k[s + j, s + j] > 0 else 0.0
         for j in range(e):
@@ -310,9 +312,9 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
             letters.ctypes.data, letters.ctypes.data + 1, at, Q.ctypes.data, at, w.ctypes.data,
             work.ctypes.data, at + 8, at + 12,
         )  # fmt: skip
-        failed = failed or sizes[3] != 0
+        has_failed = has_failed or sizes[3] != 0
         for j in range(e):
-            scale = 1 / np.sqrt(w[j]) if w[j] > least * w[e - 1] else 0.0
+            scale = 1 / np.sqrt(w[j]) if w[j] > tolerance * w[e - 1] else 0.0
             for i in range(e):
                 Z[begin + (s + i) * e + j] = D[i] * Q[j * e + i] * scale
             for i in range(s):
@@ -332,34 +334,34 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
         first, size = offsets[b], offsets[b + 1] - offsets[b]
         e = size - n_standard[b]
         for j in range(e):
-            alive = False
+            has_energy = False
             for i in range(size):
                 entry = Z[begin + i * e + j]
                 if entry != 0:
                     to = place[members[first + i]]
                     column[to], value[to] = count, entry
                     place[members[first + i]] += 1
-                    alive = True
-            count += alive
+                    has_energy = True
+            count += has_energy
         begin += size * e
     # Addresses alone keep no array alive: numba frees it after its last use.
-    if failed or letters[0] + len(work) + len(pivots) + len(ss) + len(w) + len(Q) < 1:
+    if has_failed or letters[0] + len(work) + len(pivots) + len(ss) + len(w) + len(Q) < 1:
         count = -1
     return start, column, value, count
 
 
 @kernel
-def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-untyped-def]
+def add_solved(members, start, offset, inverse, r, result):  # type: ignore[no-untyped-def]
     """Add the inverse of each block times its part of r.
 
     Parameters
     ----------
     members, start, offset, inverse : as of `Patches`
     r : (n,) array
-    out : (n,) array
+    result : (n,) array
         Changed.
     """
-    part = np.empty(len(out), out.dtype)  # no block holds more
+    part = np.empty(len(result), result.dtype)  # no block holds more
     for g in range(len(start) - 1):
         first, size = start[g], start[g + 1] - start[g]
         for i in range(size):
@@ -372,4 +374,4 @@ def add_solved(members, start, offset, inverse, r, out):  # type: ignore[no-unty
                 part[i] += value * inverse[p + i]
             p += size
         for i in range(size):
-            out[members[first + i]] += part[i]
+            result[members[first + i]] += part[i]

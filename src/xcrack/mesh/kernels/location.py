@@ -110,7 +110,9 @@ def cells_in_bins(points, cells, every, shape):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def locate_points(points, cells, gradient, grid, shape, x, tolerance):  # type: ignore[no-untyped-def]
+def locate_points(  # type: ignore[no-untyped-def]
+    points, cells, gradient, grid, shape, x, tolerance
+):
     """Cell of each point, the one with the nearest centroid where several have it.
 
     Parameters
@@ -157,18 +159,20 @@ def locate_points(points, cells, gradient, grid, shape, x, tolerance):  # type: 
 
 
 @kernel
-def _is_inside(points, cells, gradient, e, x, tolerance, coordinates):  # type: ignore[no-untyped-def]
+def _is_inside(  # type: ignore[no-untyped-def]
+    points, cells, gradient, e, x, tolerance, coordinates
+):
     """Whether a cell has a point, whose barycentric coordinates are set."""
-    d, total, least = points.shape[1], 0.0, 1.0
+    d, total, smallest = points.shape[1], 0.0, 1.0
     for i in range(1, d + 1):
         coordinates[i] = 0.0
         for j in range(d):
             coordinates[i] += gradient[e, i, j] * (x[j] - points[cells[e, 0], j])
         total += coordinates[i]
-        if coordinates[i] < least:
-            least = coordinates[i]
+        if coordinates[i] < smallest:
+            smallest = coordinates[i]
     coordinates[0] = 1 - total
-    return least >= -tolerance and coordinates[0] >= -tolerance
+    return smallest >= -tolerance and coordinates[0] >= -tolerance
 
 
 @kernel
@@ -250,18 +254,18 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
         for s in range(last + 1):
             gx = x[i, 0] - vertices[s, 0]
             gy = x[i, 1] - vertices[s, 1]
-            along = gx * ex[s] + gy * ey[s]
-            if along < 0.0:
-                along = 0.0
-            elif along > length[s]:
-                along = length[s]
-            rx = gx - along * ex[s]
-            ry = gy - along * ey[s]
+            foot = gx * ex[s] + gy * ey[s]
+            if foot < 0.0:
+                foot = 0.0
+            elif foot > length[s]:
+                foot = length[s]
+            rx = gx - foot * ex[s]
+            ry = gy - foot * ey[s]
             square = rx * rx + ry * ry
             if square < best:
                 best = square
                 where = s
-                at = along
+                at = foot
         s = where
         gx = x[i, 0] - vertices[s, 0]
         gy = x[i, 1] - vertices[s, 1]
@@ -320,7 +324,7 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
     nearest, distance = np.full(n, -1, np.int64), np.full(n, np.inf)
     start = 0
     for i in range(n):
-        best, least, where = bound, bound * bound, -1
+        best, smallest, where = bound, bound * bound, -1
         for k in range(-1, stretches):
             b = start if k < 0 else k
             if k == start:
@@ -330,15 +334,15 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
                 square += (x[i, j] - middle[b, j]) ** 2
             if square >= (best + reach[b]) ** 2:
                 continue
-            closer = False
+            is_closer = False
             for v in range(b * each, min(count, (b + 1) * each)):
                 square = 0.0
                 for j in range(dim):
                     square += (x[i, j] - vertices[v, j]) ** 2
-                if square < least:
-                    least, where, closer = square, v, True
-            if closer:
-                best = math.sqrt(least)
+                if square < smallest:
+                    smallest, where, is_closer = square, v, True
+            if is_closer:
+                best = math.sqrt(smallest)
         if where >= 0:
             nearest[i], distance[i] = where, best
             start = where // each

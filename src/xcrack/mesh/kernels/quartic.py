@@ -32,13 +32,13 @@ def _factors(c, value, slope):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _place(table, nodes, bary, x, along, value, slope):  # type: ignore[no-untyped-def]
+def _place(table, nodes, bary, x, tangents, value, slope):  # type: ignore[no-untyped-def]
     """Point of a piece, and its derivatives along the barycentric coordinates `(c, d)`."""
     corners, d = table.shape[1], nodes.shape[1]
     for j in range(corners):
         _factors(bary[j], value[j], slope[j])
     x[:] = 0.0
-    along[:] = 0.0
+    tangents[:] = 0.0
     for a in range(len(table)):
         shape = 1.0
         for j in range(corners):
@@ -51,13 +51,13 @@ def _place(table, nodes, bary, x, along, value, slope):  # type: ignore[no-untyp
                 if k != j:
                     change *= value[k, table[a, k]]
             for i in range(d):
-                along[j, i] += change * nodes[a, i]
+                tangents[j, i] += change * nodes[a, i]
 
 
 @kernel
 def _along_edge(table, nodes, target, bary, first, second, work):  # type: ignore[no-untyped-def]
     """Move `bary` to the nearest point of an edge of a piece; the squared distance to it."""
-    x, along, value, slope = work
+    x, tangents, value, slope = work
     t = bary[second] / max(bary[first] + bary[second], 1e-300)
     t = min(max(t, 0.0), 1.0)
     if not t >= 0.0:
@@ -67,23 +67,23 @@ def _along_edge(table, nodes, target, bary, first, second, work):  # type: ignor
     for _ in range(_STEPS):
         bary[:] = 0.0
         bary[first], bary[second] = 1.0 - t, t
-        _place(table, nodes, bary, x, along, value, slope)
-        up, down, distance = 0.0, 0.0, 0.0
+        _place(table, nodes, bary, x, tangents, value, slope)
+        up, curvature, distance = 0.0, 0.0, 0.0
         for i in range(d):
-            tangent = along[second, i] - along[first, i]
+            tangent = tangents[second, i] - tangents[first, i]
             up += tangent * (target[i] - x[i])
-            down += tangent * tangent
+            curvature += tangent * tangent
             distance += (target[i] - x[i]) ** 2
         if distance < square:
             best, square = t, distance
-        step = min(max(up / max(down, 1e-300), -_WIDEST), _WIDEST)
-        new = min(max(t + step, 0.0), 1.0)
-        if abs(new - t) <= _AT_REST:
+        step = min(max(up / max(curvature, 1e-300), -_WIDEST), _WIDEST)
+        position = min(max(t + step, 0.0), 1.0)
+        if abs(position - t) <= _AT_REST:
             break
-        t = new
+        t = position
     bary[:] = 0.0
     bary[first], bary[second] = 1.0 - best, best
-    _place(table, nodes, bary, x, along, value, slope)
+    _place(table, nodes, bary, x, tangents, value, slope)
     return square
 
 
@@ -93,13 +93,13 @@ def _move_inside(table, nodes, target, bary, work):  # type: ignore[no-untyped-d
 
     Returns the squared distance to it, inf where it would lie beyond an edge.
     """
-    x, along, value, slope = work
+    x, tangents, value, slope = work
     square = np.inf
     for _ in range(_STEPS):
-        _place(table, nodes, bary, x, along, value, slope)
+        _place(table, nodes, bary, x, tangents, value, slope)
         aa, bb, ab, ea, eb, square = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(3):
-            a, b = along[1, i] - along[0, i], along[2, i] - along[0, i]
+            a, b = tangents[1, i] - tangents[0, i], tangents[2, i] - tangents[0, i]
             e = target[i] - x[i]
             aa, bb, ab = aa + a * a, bb + b * b, ab + a * b
             ea, eb, square = ea + e * a, eb + e * b, square + e * e
@@ -113,14 +113,14 @@ def _move_inside(table, nodes, target, bary, work):  # type: ignore[no-untyped-d
         bary[1] += u
         bary[2] += v
         bary[0] = 1.0 - bary[1] - bary[2]
-        lowest = min(bary[0], bary[1], bary[2])
-        if lowest < -2 * _WIDEST or (longest < _NEARLY and lowest < -10 * longest):
+        smallest = min(bary[0], bary[1], bary[2])
+        if smallest < -2 * _WIDEST or (longest < _NEARLY and smallest < -10 * longest):
             return np.inf
         if longest <= _AT_REST:
             break
-    if lowest < 0.0:
+    if smallest < 0.0:
         return np.inf
-    _place(table, nodes, bary, x, along, value, slope)
+    _place(table, nodes, bary, x, tangents, value, slope)
     return square
 
 
@@ -134,13 +134,13 @@ def _may_be_nearer(x, centre, radius, square):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def nearest_on_pieces(x, near, offsets, piece, local, nodes, centre, radius):  # type: ignore[no-untyped-def]
+def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radius):  # type: ignore[no-untyped-def]
     """Nearest points of quartic pieces.
 
     Parameters
     ----------
     x : (q, d) array
-    near : (q, k) array of int
+    candidates : (q, k) array of int
         Nodes from whose pieces the search begins.
     offsets : (n + 1,) array of int
     piece, local : (.,) arrays of int
@@ -160,31 +160,31 @@ def nearest_on_pieces(x, near, offsets, piece, local, nodes, centre, radius):  #
     corners, d = table.shape[1], x.shape[1]
     foot, owner = x.copy(), np.full(len(x), -1, np.int64)
     work = (np.empty(d), np.empty((corners, d)), np.empty((corners, 5)), np.empty((corners, 5)))
-    bary, tried = np.empty(corners), np.empty(_MOST_PIECES, np.int64)
+    bary, tried_pieces = np.empty(corners), np.empty(_MOST_PIECES, np.int64)
     start = np.empty((_MOST_PIECES, corners))
     for q in range(len(x)):
-        least, count = np.inf, 0
-        for n in near[q]:
+        smallest, count = np.inf, 0
+        for n in candidates[q]:
             for row in range(offsets[n], offsets[n + 1]):
                 f = piece[row]
                 is_new = count < _MOST_PIECES
-                for other in tried[:count]:
+                for other in tried_pieces[:count]:
                     is_new = is_new and other != f
                 if not is_new:
                     continue
-                tried[count] = f
+                tried_pieces[count] = f
                 for j in range(corners):
                     bary[j] = start[count, j] = table[local[row], j] / 4.0
                 count += 1
-                if corners == 3 and _may_be_nearer(x[q], centre[f], radius[f], least):
+                if corners == 3 and _may_be_nearer(x[q], centre[f], radius[f], smallest):
                     square = _move_inside(table, nodes[f], x[q], bary, work)
-                    if square < least:
-                        least, owner[q] = square, f
+                    if square < smallest:
+                        smallest, owner[q] = square, f
                         foot[q] = work[0]
         # Edges after all insides: most of them are farther than what has been found.
         for c in range(count):
-            f = tried[c]
-            if not _may_be_nearer(x[q], centre[f], radius[f], least):
+            f = tried_pieces[c]
+            if not _may_be_nearer(x[q], centre[f], radius[f], smallest):
                 continue
             edge = corners + 1  # the node at the middle of the first edge; of the next, three on
             for first in range(corners - 1):
@@ -195,12 +195,12 @@ def nearest_on_pieces(x, near, offsets, piece, local, nodes, centre, radius):  #
                         one, other = nodes[f, first, i] - middle[i], nodes[f, second, i] - middle[i]
                         half = max(half, abs(one), abs(other))
                     edge += 3
-                    if not _may_be_nearer(x[q], middle, _ROOMY * math.sqrt(d) * half, least):
+                    if not _may_be_nearer(x[q], middle, _ROOMY * math.sqrt(d) * half, smallest):
                         continue
                     bary[:] = start[c]
                     square = _along_edge(table, nodes[f], x[q], bary, first, second, work)
-                    if square < least:
-                        least, owner[q] = square, f
+                    if square < smallest:
+                        smallest, owner[q] = square, f
                         foot[q] = work[0]
     return foot, owner
 
@@ -218,15 +218,15 @@ def points_of_pieces(nodes, owner, bary):  # type: ignore[no-untyped-def]
     Returns
     -------
     x : (q, d) array
-    along : (q, c, d) array
+    tangents : (q, c, d) array
     """
     table = _OF_LINE if nodes.shape[1] == 5 else _OF_TRIANGLE
     corners, d = table.shape[1], nodes.shape[2]
-    x, along = np.empty((len(owner), d)), np.empty((len(owner), corners, d))
+    x, tangents = np.empty((len(owner), d)), np.empty((len(owner), corners, d))
     value, slope = np.empty((corners, 5)), np.empty((corners, 5))
     for q in range(len(owner)):
-        _place(table, nodes[owner[q]], bary[q], x[q], along[q], value, slope)
-    return x, along
+        _place(table, nodes[owner[q]], bary[q], x[q], tangents[q], value, slope)
+    return x, tangents
 
 
 __all__ = []

@@ -87,16 +87,16 @@ def _sort(phi, x, e, order, count):  # type: ignore[no-untyped-def]
             one, j = order[i], i
             while j > first:
                 other = order[j - 1]
-                near, far = abs(phi[e, one]), abs(phi[e, other])
-                if abs(near - far) > _SAME * max(near, far):
-                    if near > far:
+                distance, other_distance = abs(phi[e, one]), abs(phi[e, other])
+                if abs(distance - other_distance) > _SAME * max(distance, other_distance):
+                    if distance > other_distance:
                         break
                 elif x.shape[0] == 0:
                     break
                 else:
-                    short = _distance_sum(x, e, one, order, begin, end)
-                    long = _distance_sum(x, e, other, order, begin, end)
-                    if short > (1.0 - _SAME) * long:
+                    distance_sum = _distance_sum(x, e, one, order, begin, end)
+                    other_sum = _distance_sum(x, e, other, order, begin, end)
+                    if distance_sum > (1.0 - _SAME) * other_sum:
                         break
                 order[j] = other
                 j -= 1
@@ -104,7 +104,7 @@ def _sort(phi, x, e, order, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
+def cut_simplices(phi, x, least_volume):  # type: ignore[no-untyped-def]
     """Sub-simplices of triangles or tetrahedra with vertex values of both signs.
 
     Parameters
@@ -113,7 +113,7 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
         n = d + 1.
     x : (k or 0, n, m) array
         Vertices, whose distances decide how equal values are split.
-    least : float
+    least_volume : float
         Share of a simplex up to which a part is left out.
 
     Returns
@@ -123,9 +123,9 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
     side, parent : (s,) arrays of int
     """
     k, n = phi.shape
-    most = n * k if n == 3 else 6 * k
-    bary, fraction = np.empty((most, n, n)), np.empty(most)
-    side, parent = np.empty(most, np.int64), np.empty(most, np.int64)
+    capacity = n * k if n == 3 else 6 * k
+    bary, fraction = np.empty((capacity, n, n)), np.empty(capacity)
+    side, parent = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
     order, chosen = np.empty(n, np.int64), np.empty(n, np.int64)
     t, u, point = np.empty(n), np.empty(n), _corners(n)
     to = 0
@@ -136,16 +136,16 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
         _sort(phi, x, e, order, count)
         if count == 1 or count == n - 1:
             side_sign, other = (1, 1) if count == 1 else (-1, 0)
-            alone = order[(n - 1) * (1 - other)]
+            apex = order[(n - 1) * (1 - other)]
             total = 1.0
-            chosen[0] = alone
+            chosen[0] = apex
             for m in range(n - 1):
-                t[m], u[m] = _mix(point, 4 + m, phi, e, alone, order[other + m])
+                t[m], u[m] = _mix(point, 4 + m, phi, e, apex, order[other + m])
                 total *= t[m]
                 chosen[1 + m] = 4 + m
             _set_vertices(bary, to, point, chosen)
             fraction[to], side[to], parent[to] = total, side_sign, e
-            to += total > least
+            to += total > least_volume
             share = 1.0
             for i in range(n - 1):
                 chosen[1 + i] = order[other + i]
@@ -153,7 +153,7 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
                 chosen[m] = 4 + m
                 _set_vertices(bary, to, point, chosen)
                 fraction[to], side[to], parent[to] = share * u[m], -side_sign, e
-                to += fraction[to] > least
+                to += fraction[to] > least_volume
                 share *= t[m]
             continue
         for side_sign in (1, -1):
@@ -178,7 +178,7 @@ def cut_simplices(phi, x, least):  # type: ignore[no-untyped-def]
                     fraction[to] = t_bc * t_bd
                 _set_vertices(bary, to, point, chosen)
                 side[to], parent[to] = side_sign, e
-                to += fraction[to] > least
+                to += fraction[to] > least_volume
     return bary[:to], fraction[:to], side[:to], parent[:to]
 
 
@@ -217,9 +217,9 @@ def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
     for e in range(k):
         count = _sides(phi, e, order)
         if count == 1 or count == n - 1:
-            alone, other = (order[0], 1) if count == 1 else (order[n - 1], 0)
+            apex, other = (order[0], 1) if count == 1 else (order[n - 1], 0)
             for m in range(n - 1):
-                _mix(point, 4 + m, phi, e, alone, order[other + m])
+                _mix(point, 4 + m, phi, e, apex, order[other + m])
                 chosen[m] = 4 + m
             _set_vertices(bary, to, point, chosen)
             parent[to] = e
@@ -266,12 +266,12 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
         x, y = end[s, 0] - begin[s, 0], end[s, 1] - begin[s, 1]
         length = math.sqrt(x * x + y * y)
         middle0, middle1 = (begin[s, 0] + end[s, 0]) / 2, (begin[s, 1] + end[s, 1]) / 2
-        nearest, least = -1, np.inf
+        nearest, smallest = -1, np.inf
         for t in range(len(tips)):
             a, b = middle0 - tips[t, 0], middle1 - tips[t, 1]
             distance = math.sqrt(a * a + b * b)
-            if distance < least:
-                nearest, least = t, distance
+            if distance < smallest:
+                nearest, smallest = t, distance
         is_near, foot = False, 0.0
         if nearest >= 0:
             a, b = tips[nearest, 0] - begin[s, 0], tips[nearest, 1] - begin[s, 1]
@@ -287,9 +287,9 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
                 foot = 0.0
             elif abs(foot - 1) < close_share:
                 foot = 1.0
-            closest = min(max(foot, 0.0), 1.0)
-            a = begin[s, 0] + closest * x - tips[nearest, 0]
-            b = begin[s, 1] + closest * y - tips[nearest, 1]
+            position = min(max(foot, 0.0), 1.0)
+            a = begin[s, 0] + position * x - tips[nearest, 0]
+            b = begin[s, 1] + position * y - tips[nearest, 1]
             is_near = math.sqrt(a * a + b * b) < length
         for part in range(2):
             sign = 1.0 if part == 1 else -1.0
@@ -419,18 +419,18 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore
     int
         Number of parts.
     """
-    stack, deep = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
+    stack, depths = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
     triangle, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     count = 0
     for s in range(len(x)):
         top = 1
-        deep[0] = 0
+        depths[0] = 0
         for i in range(3):
             for b in range(3):
                 stack[0, i, b] = 1.0 if i == b else 0.0
         while top > 0:
             top -= 1
-            level = deep[top]
+            level = depths[top]
             for i in range(3):
                 for b in range(3):
                     triangle[i, b] = stack[top, i, b]
@@ -469,6 +469,6 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore
                     stack[top + 1 + i, 1, b] = middle[i, b]
                     stack[top + 1 + i, 2, b] = middle[(i + 2) % 3, b]
             for i in range(4):
-                deep[top + i] = level + 1
+                depths[top + i] = level + 1
             top += 4
     return count

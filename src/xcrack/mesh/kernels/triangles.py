@@ -56,11 +56,11 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
     low = np.empty((2 * k + 1, 3))
     high = np.empty((2 * k + 1, 3))
     node[0, 1], node[0, 2] = 0, k
-    used = 1
+    nodes_in_use = 1
     at = 0
-    while at < used:
+    while at < nodes_in_use:
         first, last = node[at, 1], node[at, 2]
-        widest, axis = -1.0, 0
+        width, axis = -1.0, 0
         for d in range(3):
             bottom, top = np.inf, -np.inf
             middle_low, middle_high = np.inf, -np.inf
@@ -72,18 +72,18 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
                 middle_low = min(middle_low, middle)
                 middle_high = max(middle_high, middle)
             low[at, d], high[at, d] = bottom, top
-            if middle_high - middle_low > widest:
-                widest, axis = middle_high - middle_low, d
+            if middle_high - middle_low > width:
+                width, axis = middle_high - middle_low, d
         node[at, 0] = -1
         if last - first > LEAF:
             _sort(order, first, last, lower, upper, axis)
             half = (first + last) // 2
-            node[at, 0] = used
-            node[used, 1], node[used, 2] = first, half
-            node[used + 1, 1], node[used + 1, 2] = half, last
-            used += 2
+            node[at, 0] = nodes_in_use
+            node[nodes_in_use, 1], node[nodes_in_use, 2] = first, half
+            node[nodes_in_use + 1, 1], node[nodes_in_use + 1, 2] = half, last
+            nodes_in_use += 2
         at += 1
-    return order, node[:used].copy(), low[:used].copy(), high[:used].copy()
+    return order, node[:nodes_in_use].copy(), low[:nodes_in_use].copy(), high[:nodes_in_use].copy()
 
 
 @kernel
@@ -100,12 +100,12 @@ def _to_box(p, low, high):  # type: ignore[no-untyped-def]
 @kernel
 def _on_edge(p, a, b, foot):  # type: ignore[no-untyped-def]
     """Position in [0, 1] of the point of an edge closest to p, put into foot."""
-    along = 0.0
+    dot = 0.0
     square = 0.0
     for d in range(3):
-        along += (p[d] - a[d]) * (b[d] - a[d])
+        dot += (p[d] - a[d]) * (b[d] - a[d])
         square += (b[d] - a[d]) * (b[d] - a[d])
-    position = along / square
+    position = dot / square
     if not position > 0.0:
         position = 0.0
     elif position > 1.0:
@@ -124,7 +124,7 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
     height = 0.0
     for d in range(3):
         height += (p[d] - corner[0, d]) * normal[d]
-    inside = True
+    is_inside = True
     for i in range(3):
         j = (i + 1) % 3
         # Sign of the area spanned by edge i j and the point, seen along the normal.
@@ -138,8 +138,8 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
             + (ex * gy - ey * gx) * normal[2]
         )
         if not area > 0.0:
-            inside = False
-    if inside:
+            is_inside = False
+    if is_inside:
         for d in range(3):
             foot[d] = p[d] - height * normal[d]
         return height * height, 0
@@ -179,7 +179,7 @@ def _push_children(p, child, low, high, stack, stack_square, top):  # type: igno
 
 
 @kernel
-def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  # type: ignore[no-untyped-def]
+def closest_triangle(x, corners, normal, order, node, low, high, band, tolerance):  # type: ignore[no-untyped-def]
     """Closest triangle of each point, and the part of it that is closest.
 
     Of triangles equally far (coplanar ones that overlap, say) the one with the lowest number
@@ -195,7 +195,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
         Tree of the boxes of the triangles, from `box_tree`.
     band : float
         Points farther away than this find nothing.
-    tiny : float
+    tolerance : float
         Distances that differ by less than this are equal.
 
     Returns
@@ -221,7 +221,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
     for i in range(n):
         p = x[i]
         best = band
-        reach = (best + tiny) * (best + tiny)
+        reach = (best + tolerance) * (best + tolerance)
         nearest = -1
         top = 0
         stack[0] = 0
@@ -238,18 +238,18 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tiny):  #
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
-                square, which = _to_triangle(p, corners[k], normal[k], foot_point, trial)
+                square, feature = _to_triangle(p, corners[k], normal[k], foot_point, trial)
                 gap = np.sqrt(square)
-                if gap < best - tiny or (gap <= best + tiny and k < nearest):
-                    better = True
+                if gap < best - tolerance or (gap <= best + tolerance and k < nearest):
+                    is_better = True
                 else:
-                    better = nearest < 0 and gap <= best
-                if better:
+                    is_better = nearest < 0 and gap <= best
+                if is_better:
                     best = min(best, gap)
-                    reach = (best + tiny) * (best + tiny)
+                    reach = (best + tolerance) * (best + tolerance)
                     nearest = k
                     distance[i] = gap
-                    part[i] = which
+                    part[i] = feature
                     for d in range(3):
                         foot[i, d] = foot_point[d]
         triangle[i] = nearest
@@ -309,14 +309,14 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
-                along = _on_edge(p, start[k], stop[k], foot)
+                fraction = _on_edge(p, start[k], stop[k], foot)
                 square = 0.0
                 for d in range(3):
                     square += (p[d] - foot[d]) * (p[d] - foot[d])
                 if square < best or (square == best and (nearest < 0 or k < nearest)):
                     best = square
                     nearest = k
-                    position[i] = along
+                    position[i] = fraction
         segment[i] = nearest
         distance[i] = np.sqrt(best) if nearest >= 0 else band
     return distance, segment, position
@@ -357,14 +357,14 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
         while top >= 0:
             at = stack[top]
             top -= 1
-            apart = False
+            is_apart = False
             for d in range(3):
                 if (
                     min(start[i, d], stop[i, d]) > high[at, d]
                     or max(start[i, d], stop[i, d]) < low[at, d]
                 ):
-                    apart = True
-            if apart:
+                    is_apart = True
+            if is_apart:
                 continue
             child = node[at, 0]
             if child >= 0:
@@ -374,18 +374,18 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
-                before, after = 0.0, 0.0
+                start_height, stop_height = 0.0, 0.0
                 for d in range(3):
-                    before += (start[i, d] - corners[k, 0, d]) * normal[k, d]
-                    after += (stop[i, d] - corners[k, 0, d]) * normal[k, d]
-                if before * after > 0.0 or before == after:
+                    start_height += (start[i, d] - corners[k, 0, d]) * normal[k, d]
+                    stop_height += (stop[i, d] - corners[k, 0, d]) * normal[k, d]
+                if start_height * stop_height > 0.0 or start_height == stop_height:
                     continue
-                share = before / (before - after)
+                share = start_height / (start_height - stop_height)
                 if share >= best:
                     continue
                 for d in range(3):
                     point[d] = start[i, d] + share * (stop[i, d] - start[i, d])
-                inside = True
+                is_inside = True
                 for a in range(3):
                     b = (a + 1) % 3
                     ex = corners[k, b, 0] - corners[k, a, 0]
@@ -400,8 +400,8 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
                         + (ex * gy - ey * gx) * normal[k, 2]
                     )
                     if area < -1e-12 * (ex * ex + ey * ey + ez * ez):
-                        inside = False
-                if inside:
+                        is_inside = False
+                if is_inside:
                     best = share
                     triangle[i] = k
                     position[i] = share

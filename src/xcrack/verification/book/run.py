@@ -38,9 +38,9 @@ class CaseRow:
     @property
     def passed(self) -> bool:
         """Whether every error is within its tolerance, and the rate is what it has to be."""
-        within = all(value.error <= value.tolerance for value in self.values)  # nan fails
+        is_within = all(value.error <= value.tolerance for value in self.values)  # nan fails
         rate = self.values[0].rate
-        return within and (rate is None or math.isnan(self.rate) or self.rate >= rate)
+        return is_within and (rate is None or math.isnan(self.rate) or self.rate >= rate)
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,8 @@ class Book:
     @property
     def uncovered(self) -> tuple[str, ...]:
         """Requirements that no case of the book covers, run or not."""
-        covered = {case.requirement for case in find_cases()}
-        return tuple(text for key, text in REQUIREMENTS.items() if key not in covered)
+        requirements = {case.requirement for case in find_cases()}
+        return tuple(text for key, text in REQUIREMENTS.items() if key not in requirements)
 
     def __str__(self) -> str:
         lines = [line_of(result) for result in self.results]
@@ -174,9 +174,9 @@ def run_case(case: Case, *, quick: bool = True) -> Result:
     quick : bool
         The coarsest mesh only.
     """
-    missing = _missing(case.needs)
-    if missing:
-        return Result(case, (), 0.0, skipped=missing)
+    missing_package = _missing_package(case.needs)
+    if missing_package:
+        return Result(case, (), 0.0, skipped=missing_package)
     messages: list[str] = []
     levels: list[Sequence[Value]] = []
     error, begin = "", time.perf_counter()
@@ -191,15 +191,15 @@ def run_case(case: Case, *, quick: bool = True) -> Result:
 
 
 def run_cases(
-    cases: Sequence[Case], *, quick: bool, after: Callable[[Result], None] | None = None
+    cases: Sequence[Case], *, quick: bool, report: Callable[[Result], None] | None = None
 ) -> Book:
-    """Run cases one after the other; `after` sees each result as it comes."""
+    """Run cases one after the other; `report` sees each result as it comes."""
     results = []
     for case in cases:
         result = run_case(case, quick=quick)
         results.append(result)
-        if after is not None:
-            after(result)
+        if report is not None:
+            report(result)
     return Book(tuple(results), quick)
 
 
@@ -237,7 +237,7 @@ def _use(row: CaseRow) -> float:
     return max(v.error / v.tolerance if v.tolerance else 0.0 for v in row.values)
 
 
-def _missing(name: str) -> str:
+def _missing_package(name: str) -> str:
     """Why a package that a case needs cannot be used; empty where it can."""
     if not name:
         return ""

@@ -125,27 +125,27 @@ def centre_crack(
 
 
 def annulus(
-    inner: float, outer: float, n: int, around: int, *, seed: int = 7, amplitude: float = 0.15
+    inner: float, outer: float, n: int, n_around: int, *, seed: int = 7, amplitude: float = 0.15
 ) -> Mesh:
-    """Ring of n by `around` quadrilaterals, halved; cells grow with the radius, all are moved.
+    """Ring of n by `n_around` quadrilaterals, halved; cells grow with the radius, all are moved.
 
     Its cut through x > 0 lies nowhere on a line of the mesh.
     """
     rng = np.random.default_rng(seed)
-    i, j = np.meshgrid(np.arange(n + 1), np.arange(around), indexing="ij")
-    radial = amplitude * rng.uniform(-1, 1, i.shape)
-    radial[[0, -1]] = 0
-    theta = 2 * np.pi * (j + 0.37 + amplitude * rng.uniform(-1, 1, i.shape)) / around
-    r = inner * (outer / inner) ** ((i + radial) / n)
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n_around), indexing="ij")
+    radial_shift = amplitude * rng.uniform(-1, 1, i.shape)
+    radial_shift[[0, -1]] = 0
+    theta = 2 * np.pi * (j + 0.37 + amplitude * rng.uniform(-1, 1, i.shape)) / n_around
+    r = inner * (outer / inner) ** ((i + radial_shift) / n)
     points = np.stack([r * np.cos(theta), r * np.sin(theta)], axis=-1).reshape(-1, 2)
 
     def number(i: Any, j: Any) -> Any:
-        return i * around + j % around
+        return i * n_around + j % n_around
 
     p, q = i[:-1].ravel(), j[:-1].ravel()
     a, b, c, d = number(p, q), number(p + 1, q), number(p + 1, q + 1), number(p, q + 1)
     cells = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    k = np.arange(around)
+    k = np.arange(n_around)
     sets = {
         "inner": np.stack([number(0, k), number(0, k + 1)], 1),
         "outer": np.stack([number(n, k), number(n, k + 1)], 1),
@@ -155,8 +155,8 @@ def annulus(
 
 def l2(values: Floats, reference: Floats, measure: Floats) -> float:
     """Relative L2 error along crack faces."""
-    wrong = np.sum(measure * (values - reference) ** 2)
-    return float(np.sqrt(wrong / np.sum(measure * reference**2)))
+    square_error = np.sum(measure * (values - reference) ** 2)
+    return float(np.sqrt(square_error / np.sum(measure * reference**2)))
 
 
 def inner_part(s: Floats, share: float = 0.8) -> Any:

@@ -27,12 +27,14 @@ def turn(axis: Sequence[float], angle: float) -> Floats:
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 
-def lines(low: float, high: float, fine: tuple[float, float], h: float, ratio: float = 1.5) -> Any:
-    """Coordinates from low to high: spacing about h between both of fine, growing beyond."""
-    start, stop = fine
+def lines(
+    low: float, high: float, fine_range: tuple[float, float], h: float, ratio: float = 1.5
+) -> Any:
+    """Coordinates from low to high: spacing h between both ends of `fine_range`, growing beyond."""
+    start, stop = fine_range
     inner = np.linspace(start, stop, max(1, round((stop - start) / h)) + 1)
 
-    def away(length: float) -> Floats:
+    def distances_away(length: float) -> Floats:
         if length <= 1e-9 * h:
             return np.zeros(0)
         steps = [h * ratio]
@@ -40,7 +42,9 @@ def lines(low: float, high: float, fine: tuple[float, float], h: float, ratio: f
             steps.append(steps[-1] * ratio)
         return np.asarray(length * np.cumsum(steps) / sum(steps))
 
-    return np.concatenate([start - away(start - low)[::-1], inner, stop + away(high - stop)])
+    return np.concatenate(
+        [start - distances_away(start - low)[::-1], inner, stop + distances_away(high - stop)]
+    )
 
 
 def graded(lines_of_axis: Sequence[Floats], *, seed: int, amplitude: float = 0.15) -> Mesh:
@@ -52,8 +56,8 @@ def graded(lines_of_axis: Sequence[Floats], *, seed: int, amplitude: float = 0.1
     rng = np.random.default_rng(seed)
     for k, line in enumerate(lines_of_axis):
         gap = np.minimum(np.diff(line, prepend=np.nan), np.diff(line, append=np.nan))
-        drawn = amplitude * gap[place[:, k]] * rng.uniform(-1, 1, len(x))
-        x[:, k] += np.where(np.isnan(drawn), 0.0, drawn)
+        shift = amplitude * gap[place[:, k]] * rng.uniform(-1, 1, len(x))
+        x[:, k] += np.where(np.isnan(shift), 0.0, shift)
     return Mesh(x, mesh.cells, mesh.facet_sets)
 
 

@@ -51,10 +51,10 @@ def perturbed(n: tuple[int, ...], axis: int, seed: int = 1201) -> Mesh:
     mesh = with_halves(box((0.0,) * dim, (1.0,) * dim, n), axis)
     x = np.array(mesh.points)
     inner = np.asarray(((x > 1e-9) & (x < 1 - 1e-9)).all(axis=1))
-    moved = np.random.default_rng(seed).uniform(-0.2, 0.2, x.shape) / np.array(n) * inner[:, None]
-    moved[np.abs(x[:, axis] - 0.5) < 1e-9, axis] = 0.0
+    shift = np.random.default_rng(seed).uniform(-0.2, 0.2, x.shape) / np.array(n) * inner[:, None]
+    shift[np.abs(x[:, axis] - 0.5) < 1e-9, axis] = 0.0
     facets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
-    return Mesh(x + moved, mesh.cells, facets, mesh.cell_sets)
+    return Mesh(x + shift, mesh.cells, facets, mesh.cell_sets)
 
 
 def square(n: int) -> Mesh:
@@ -82,10 +82,10 @@ def slanted_crack(n: int, ratio: float, nu: float, domain: float | None = None) 
     return Problem(square(n), pair(ratio, nu), [crack], loads=PULL, numerics=numerics)
 
 
-def heated(n: int, ratio: float, before: float, behind: float) -> Problem:
+def heated(n: int, ratio: float, alpha_before: float, alpha_behind: float) -> Problem:
     """Free plate with an edge crack, whose halves expand unlike."""
     crack = line_crack([(0, 0), (0.4, 0)])
-    materials = pair(ratio, alphas=(before, behind))
+    materials = pair(ratio, alphas=(alpha_before, alpha_behind))
     warm = [temperature(1.0)]
     return Problem(square(n), materials, [crack], loads=warm, contact="off")
 
@@ -101,9 +101,9 @@ def strip(n: int, material: Any, sets: Any = None, **choices: Any) -> Problem:
     if sets is not None:
         facets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
         mesh = Mesh(mesh.points, mesh.cells, facets, sets(mesh.points[mesh.cells].mean(axis=1)))
-    apart = [displacement("top", (0.0, 0.5)), displacement("bottom", (0.0, -0.5))]
+    pulls = [displacement("top", (0.0, 0.5)), displacement("bottom", (0.0, -0.5))]
     crack = line_crack([(-11.0, 0.0), (0.0123, 0.0)])
-    return Problem(mesh, material, [crack], apart, **choices)
+    return Problem(mesh, material, [crack], pulls, **choices)
 
 
 def layered_strip(n: int, ratio: float) -> tuple[SIF, float]:
@@ -112,8 +112,8 @@ def layered_strip(n: int, ratio: float) -> tuple[SIF, float]:
     core = (round(0.3 * n) + 0.5) * height
 
     def sets(x: Floats) -> dict[str, Ints]:
-        inside = np.abs(x[:, 1]) < core
-        return {"core": np.nonzero(inside)[0], "skin": np.nonzero(~inside)[0]}
+        is_core = np.abs(x[:, 1]) < core
+        return {"core": np.nonzero(is_core)[0], "skin": np.nonzero(~is_core)[0]}
 
     materials = {
         "core": Isotropic(1.0, 0.3, "strain"),
@@ -151,10 +151,12 @@ def crack_in_planes(
     mesh = mesh.with_cell_sets({"above": lambda x: x[:, 1] > 0, "below": lambda x: x[:, 1] < 0})
     materials = {"above": Isotropic(*upper, plane), "below": Isotropic(*lower, plane)}
 
-    def moved(x: Floats) -> Floats:
+    def imposed_displacement(x: Floats) -> Floats:
         return interface_crack.displacement(x, 1.0, 1.0, upper, lower, plane)  # type: ignore[arg-type]
 
-    supports = [displacement(side, moved) for side in ("left", "right", "top", "bottom")]
+    supports = [
+        displacement(side, imposed_displacement) for side in ("left", "right", "top", "bottom")
+    ]
     crack = line_crack([(-1.0, 0.0), (1.0, 0.0)])
     return Problem(mesh, materials, [crack], supports, [crack_pressure(1.0)], contact="off")
 

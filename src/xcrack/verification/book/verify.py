@@ -27,8 +27,8 @@ def book_page(book: Book, versions: dict[str, str]) -> str:
     versions : dict
         Of xcrack, Python and the packages it was run with.
     """
-    failed = [result for result in book.results if result.status == "failed"]
-    verdict = "Every case passed." if book.passed else f"{len(failed)} case(s) failed."
+    failures = [result for result in book.results if result.status == "failed"]
+    verdict = "Every case passed." if book.passed else f"{len(failures)} case(s) failed."
     extent = "coarsest meshes of the quick cases" if book.quick else "all meshes"
     intro = (
         f"{len(book.results)} cases, {extent}, {book.seconds:.0f} s. Each number is compared with "
@@ -36,7 +36,7 @@ def book_page(book: Book, versions: dict[str, str]) -> str:
         "reference, or of the scale of the field. Run it yourself: python -m xcrack verify"
         + (" --quick" if book.quick else "")
     )
-    uncovered = book.uncovered
+    gaps = book.uncovered
     return page(
         "xcrack: verification book",
         element("h1", "Verification book of xcrack"),
@@ -45,7 +45,7 @@ def book_page(book: Book, versions: dict[str, str]) -> str:
         element("h2", "Requirements"),
         _matrix(book),
         element("h2", "Requirements without a case"),
-        list_markup(uncovered) if uncovered else element("p", "There are none."),
+        list_markup(gaps) if gaps else element("p", "There are none."),
         element("h2", "Cases"),
         *(_case(result) for result in book.results),
         element("h2", "Versions"),
@@ -149,11 +149,11 @@ def verify(
     True
     """
 
-    def after(result: Result) -> None:
+    def report_case(result: Result) -> None:
         if progress:
             print(line_of(result), file=sys.stderr, flush=True)
 
-    book = run_cases(chosen(only, quick=quick), quick=quick, after=after)
+    book = run_cases(chosen(only, quick=quick), quick=quick, report=report_case)
     if file is not None:
         write_book(book, Path(file))
     return book
@@ -167,12 +167,12 @@ def write_book(book: Book, path: Path) -> None:
     ProblemError
         The system refuses.
     """
-    known = versions()
-    numbers = {"quick": book.quick, "passed": book.passed, "versions": known,
+    versions_in_use = versions()
+    numbers = {"quick": book.quick, "passed": book.passed, "versions": versions_in_use,
                "cases": [_content(result) for result in book.results],
                "uncovered": list(book.uncovered)}  # fmt: skip
     text = json.dumps(numbers, indent=1, ensure_ascii=False)
-    texts = {path: book_page(book, known), path.with_suffix(".json"): text + "\n"}
+    texts = {path: book_page(book, versions_in_use), path.with_suffix(".json"): text + "\n"}
     write_texts(texts, "the book cannot be written to", error=ProblemError)
 
 

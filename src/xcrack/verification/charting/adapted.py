@@ -37,15 +37,15 @@ class ToleranceRun:
 
 def chart_tolerances(value: Any, what: str, error: type[XcrackError]) -> tuple[float, ...]:
     """Tolerances of `adapt`, checked, from large to small."""
-    given = {
+    arguments = {
         number(one, f"{what}[{k}]", above=0, below=1, error=error)
         for k, one in enumerate(entries(value, what, error=error))
     }
-    if not given:
+    if not arguments:
         raise error(f"{what} is empty: give numbers between 0 and 1, or leave it out.")
-    if min(given) < _STRONGEST:
-        raise error(f"{what}: {min(given):g} is too small: give {_STRONGEST:g} or more.")
-    return tuple(sorted(given, reverse=True))
+    if min(arguments) < _STRONGEST:
+        raise error(f"{what}: {min(arguments):g} is too small: give {_STRONGEST:g} or more.")
+    return tuple(sorted(arguments, reverse=True))
 
 
 def tolerances_to_run(
@@ -121,12 +121,12 @@ def _run(
 
 def row_of(run: ToleranceRun, places: Sampled, reference: Floats, scale: float) -> ChartRow:
     """A run of `adapt` against the reference."""
-    values, failed = np.zeros(0), run.failed
+    values, message = np.zeros(0), run.failed
     if run.sample is not None:
         try:
             values = lock(at_places(run.sample, places))
         except ProblemError as error:
-            failed = str(error)
+            message = str(error)
     last = None if run.result is None else run.result.problem
     return ChartRow(
         setting=_NAME,
@@ -135,10 +135,10 @@ def row_of(run: ToleranceRun, places: Sampled, reference: Floats, scale: float) 
         size=np.nan if last is None else smallest(last.mesh),
         unknowns=0 if run.result is None else run.result.rounds[-1].unknowns,
         seconds=run.seconds,
-        error=np.nan if failed else float(np.linalg.norm(values - reference)) / scale,
+        error=np.nan if message else float(np.linalg.norm(values - reference)) / scale,
         values=values,
         warnings=run.warnings,
-        failed=failed,
+        failed=message,
         problem=last,
     )
 

@@ -41,7 +41,7 @@ from xcrack.verification.charting.settings import (
     Named,
     checked_meshes,
     default_settings,
-    made,
+    make_mesh,
     mean_size,
     named_settings,
     smallest,
@@ -137,11 +137,11 @@ def chart(
     >>> sorted({row.setting for row in chart.rows})
     ['as given', 'order 1']
     """
-    named = cast(Named, settings) if settings is not None else default_settings(problem)
+    settings_by_name = cast(Named, settings) if settings is not None else default_settings(problem)
     for state in states or ():
         problem.state(state)
     aims = tolerances_to_run(tolerances, problem, settings is None)
-    runs = _Runs(problem, named, states, quantity, progress)
+    runs = _Runs(problem, settings_by_name, states, quantity, progress)
     every = _meshes(runs, meshes, repeat, seconds)
     outcomes = _timed(runs, every, repeat)
     user_quantity = None if quantity is None else partial(_of_user, quantity)
@@ -197,11 +197,11 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
             if runs.quantity is None:
                 values = K_of_all(solutions) if runs.has_tips else _energies(solutions)
         except (XcrackError, np.linalg.LinAlgError, MemoryError) as error:
-            return _failed(changes, scene, error)
+            return _failure_outcome(changes, scene, error)
         try:  # of the user's function no exception but ours is a run that failed
             sample = values if runs.quantity is None else _of_user(runs.quantity, result)
         except XcrackError as error:
-            return _failed(changes, scene, error)
+            return _failure_outcome(changes, scene, error)
         seconds = perf_counter() - start
     if not np.isfinite(sample.values).all():
         return _Outcome(changes, failed="the quantity is not finite", problem=scene)
@@ -217,7 +217,9 @@ def _run(runs: _Runs, mesh: Mesh, changes: dict[str, Any]) -> _Outcome:
     )
 
 
-def _failed(changes: dict[str, Any], scene: Problem | None, error: BaseException) -> _Outcome:
+def _failure_outcome(
+    changes: dict[str, Any], scene: Problem | None, error: BaseException
+) -> _Outcome:
     return _Outcome(changes, failed=f"{type(error).__name__}: {error}", problem=scene)
 
 
@@ -230,31 +232,33 @@ def _of_user(quantity: Quantity, result: Any) -> Sampled:
 
 
 def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:
-    whole = {name: value for name, value in changes.items() if name in IN_PROBLEM}
+    of_problem = {name: value for name, value in changes.items() if name in IN_PROBLEM}
     method = {name: value for name, value in changes.items() if name not in IN_PROBLEM}
-    return replace(problem, mesh=mesh, numerics=replace(problem.numerics, **method), **whole)
+    return replace(problem, mesh=mesh, numerics=replace(problem.numerics, **method), **of_problem)
 
 
-def _meshes(runs: _Runs, given: Meshes | None, repeat: int, seconds: float) -> list[Mesh]:
+def _meshes(runs: _Runs, meshes: Meshes | None, repeat: int, seconds: float) -> list[Mesh]:
     """All meshes; where they are made here, as many as time and memory are likely to allow."""
-    if given is not None and not callable(given):
-        return checked_meshes(runs.problem, given)
+    if meshes is not None and not callable(meshes):
+        return checked_meshes(runs.problem, meshes)
     first = runs.problem.mesh
     size = smallest(first)
-    every = [first if given is None else made(given, size)]
+    every = [first if meshes is None else make_mesh(meshes, size)]
     _run(runs, every[0], {})  # compiles kernels: its time says nothing about finer meshes
-    spent, before = 0.0, None
+    spent, base_seconds = 0.0, None
     while len(every) < _MOST_MESHES:
         base = _run(runs, every[-1], {})
         d = first.dim
-        growth = _DEARER[d] if not before else max(base.seconds / before, 2.0)
+        growth = _DEARER[d] if not base_seconds else max(base.seconds / base_seconds, 2.0)
         spent += base.seconds
-        before = base.seconds
+        base_seconds = base.seconds
         if len(every) > 1:
             total = (spent + growth * base.seconds) * len(runs.named) * (repeat + 0.5)
             if base.failed or total > seconds or base.unknowns * 2**d > _MOST_UNKNOWNS[d]:
                 break
-        every.append(refine(every[-1]) if given is None else made(given, size / 2 ** len(every)))
+        every.append(
+            refine(every[-1]) if meshes is None else make_mesh(meshes, size / 2 ** len(every))
+        )
     runs.say(f"{len(every)} meshes, {len(runs.named)} settings, {repeat} timed runs of each")
     return every
 
@@ -268,13 +272,13 @@ def _timed(
     for k, mesh in enumerate(every):
         base = _run(runs, mesh, {})
         for s, (name, changes) in enumerate(runs.named.items()):
-            resolved, missing = with_lengths(changes, base.radius)
-            if missing:
-                first[k, s] = _Outcome(resolved, failed=missing)
+            resolved_changes, message = with_lengths(changes, base.radius)
+            if message:
+                first[k, s] = _Outcome(resolved_changes, failed=message)
             elif k == 0:  # once without a clock: another setting may need another kernel
-                first[k, s] = _run(runs, mesh, resolved)
+                first[k, s] = _run(runs, mesh, resolved_changes)
             else:
-                first[k, s] = _Outcome(resolved)
+                first[k, s] = _Outcome(resolved_changes)
             if first[k, s].failed:
                 runs.say(f"mesh {k}, {name!r} failed: {first[k, s].failed}")
     for turn in range(repeat):
@@ -302,21 +306,21 @@ def _compared(
     """Errors of all runs against the one that is trusted most."""
     places = _places(outcomes)
     values: dict[tuple[int, int], Floats] = {}
-    failed: dict[tuple[int, int], str] = {}
+    failures: dict[tuple[int, int], str] = {}
     for key, (outcome, _) in outcomes.items():
         if outcome.failed or outcome.sample is None or places is None:
-            failed[key] = outcome.failed
+            failures[key] = outcome.failed
             continue
         try:
             values[key] = lock(at_places(outcome.sample, places))
         except ProblemError as error:
-            failed[key] = str(error)
+            failures[key] = str(error)
     # Without contact, say, it is another scene, which converges to other values.
     other = [s for s, changes in enumerate(runs.named.values()) if "contact" in changes]
     try:
-        best, left = most_trusted(values, [mean_size(mesh) for mesh in every], other)
+        best, remainder = most_trusted(values, [mean_size(mesh) for mesh in every], other)
     except ProblemError as error:
-        reasons = "; ".join(dict.fromkeys(failed.values()))
+        reasons = "; ".join(dict.fromkeys(failures.values()))
         raise ProblemError(f"{error} {reasons}".strip()) from error
     scale = float(np.linalg.norm(values[best]))
     if scale == 0:
@@ -338,7 +342,7 @@ def _compared(
             else np.nan,
             values=values.get((k, s), np.zeros(0)),
             warnings=outcome.warnings,
-            failed=failed.get((k, s), ""),
+            failed=failures.get((k, s), ""),
             problem=outcome.problem,
         )
         for (k, s), (outcome, time) in outcomes.items()
@@ -347,7 +351,7 @@ def _compared(
     adapted = [row_of(run, places, values[best], scale) for run in others]
     what = "quantity" if runs.quantity is not None else "K" if runs.has_tips else "strain energy"
     every_row = (*rows.values(), *adapted)
-    return Chart(every_row, rows[best], max(left / scale, 1e-15), what, wanted, repeat)
+    return Chart(every_row, rows[best], max(remainder / scale, 1e-15), what, wanted, repeat)
 
 
 def _places(outcomes: dict[tuple[int, int], tuple[_Outcome, float]]) -> Sampled | None:

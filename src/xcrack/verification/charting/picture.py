@@ -136,14 +136,14 @@ def _legend(chart: Chart, axes: Any, names: list[str]) -> None:
     """Settings by colour, meshes by marker, and what else is drawn."""
     from matplotlib.lines import Line2D
 
-    failed = {row.setting for row in chart.failed}
+    failed_settings = {row.setting for row in chart.failed}
     handles = [
         Line2D(
             [],
             [],
             color=_color(chart, name, k),
             lw=2,
-            label=name + (" (failed)" * (name in failed)),
+            label=name + (" (failed)" * (name in failed_settings)),
         )
         for k, name in enumerate(names)
     ]
@@ -159,8 +159,8 @@ def _legend(chart: Chart, axes: Any, names: list[str]) -> None:
     handles.append(Line2D([], [], label="reference", **star))
     handles.append(Line2D([], [], color="0.75", lw=6, alpha=0.6, label="cheapest for its error"))
     if any(r.error < chart.reference_error and r is not chart.reference for r in chart.good):
-        hollow = {"ls": "", "marker": "o", "mfc": "white", "mec": "0.4"}
-        handles.append(Line2D([], [], label="too close to the reference to tell", **hollow))
+        hollow_style = {"ls": "", "marker": "o", "mfc": "white", "mec": "0.4"}
+        handles.append(Line2D([], [], label="too close to the reference to tell", **hollow_style))
     if chart.wanted is not None and chart.best():
         ring = {"ls": "", "marker": "o", "ms": 11, "mfc": "none", "mec": "black", "mew": 1.3}
         handles.append(Line2D([], [], label="recommended", **ring))
@@ -188,8 +188,8 @@ def _time_ticks(axes: Any) -> None:
 
 def _limits(chart: Chart) -> tuple[float, float]:
     largest = max([chart.shown(row) for row in chart.good] + [chart.wanted or 0.0])
-    lowest = min(chart.reference_error, chart.wanted or np.inf)
-    return _BELOW * lowest, 2.0 * largest
+    lowest_error = min(chart.reference_error, chart.wanted or np.inf)
+    return _BELOW * lowest_error, 2.0 * largest
 
 
 __all__ = ["draw"]

@@ -192,7 +192,7 @@ class Chart:
             raise ProblemError("Chart.best: wanted = None: give a relative error, such as 1e-3.")
         able = [row for row in self.good if row.error + self.reference_error <= wanted]
         if not able:
-            closest = min(self.good, key=lambda row: row.error + self.reference_error)
+            closest_row = min(self.good, key=lambda row: row.error + self.reference_error)
             limit = (
                 f"The reference itself is known to {self.reference_error:.2g} only: give"
                 if wanted < self.reference_error
@@ -200,8 +200,8 @@ class Chart:
             )
             words = (
                 f"None of the {len(self.good)} runs reaches {wanted:.2g}: "
-                f"{_what(closest)} comes closest, with an error of at "
-                f"most {closest.error + self.reference_error:.2g}. {limit} finer meshes "
+                f"{_what(closest_row)} comes closest, with an error of at "
+                f"most {closest_row.error + self.reference_error:.2g}. {limit} finer meshes "
                 "(meshes=...)."
             )
             return Best(wanted, None, words)
@@ -224,17 +224,17 @@ class Chart:
             if row.failed:
                 count, numbers = "–", f"failed: {row.failed}"
             else:
-                below = row.error < self.reference_error
-                error = f"<{self.reference_error:.1e}" if below else f"{row.error:.1e}"
+                is_below = row.error < self.reference_error
+                error = f"<{self.reference_error:.1e}" if is_below else f"{row.error:.1e}"
                 count, numbers = str(row.unknowns), f"{row.seconds:7.3g} {error:>9}"
                 marks = [
                     word
-                    for word, holds in (
+                    for word, is_true in (
                         ("cheapest for its error", row in front),
                         ("reference", row is self.reference),
                         ("warned", bool(row.warnings)),
                     )
-                    if holds
+                    if is_true
                 ]
                 numbers += "  " + ", ".join(marks)
             name, mesh = _name(row), "–" if row.mesh < 0 else row.mesh
@@ -303,15 +303,15 @@ def _time(seconds: float) -> str:
 def _recipe(row: ChartRow) -> str:
     if row.mesh < 0:
         return f"Take xc.adapt(problem, tolerance={row.fields['tolerance']:g}), whose best K it is."
-    whole = [f"{k}={v!r}" for k, v in row.fields.items() if k in ("order", "contact")]
+    choices = [f"{k}={v!r}" for k, v in row.fields.items() if k in ("order", "contact")]
     method = [
         f"{k}={float(f'{v:.4g}') if isinstance(v, float) else v!r}"
         for k, v in row.fields.items()
         if k not in ("order", "contact")
     ]
     if method:
-        whole.append(f"Numerics({', '.join(method)})")
-    return f"Change {', '.join(whole)}." if whole else "The settings stay as they are."
+        choices.append(f"Numerics({', '.join(method)})")
+    return f"Change {', '.join(choices)}." if choices else "The settings stay as they are."
 
 
 __all__ = ["Best", "Chart", "ChartRow"]

@@ -50,13 +50,13 @@ Named = dict[str, dict[str, Any]]
 
 
 def named_settings(
-    given: Any, what: str = "settings", error: type[XcrackError] = ProblemError
+    settings: Any, what: str = "settings", error: type[XcrackError] = ProblemError
 ) -> Named:
     """Settings by name, checked; those of the problem are always among them.
 
     Parameters
     ----------
-    given : sequence of mappings, or mapping of name to mapping
+    settings : sequence of mappings, or mapping of name to mapping
     what : str
         Its name in a message.
     error : type of XcrackError
@@ -66,32 +66,32 @@ def named_settings(
     error
         Fields that are no choice of method, names that stand there twice.
     """
-    if isinstance(given, Mapping) and all(isinstance(v, Mapping) for v in given.values()):
-        pairs = [(str(name), changes) for name, changes in given.items()]
+    if isinstance(settings, Mapping) and all(isinstance(v, Mapping) for v in settings.values()):
+        pairs = [(str(name), changes) for name, changes in settings.items()]
     else:
         try:
-            several = entries(given, what, error=error)
+            entries_of_list = entries(settings, what, error=error)
         except error as cause:
             example = '[{"order": 1}, {"radius": 0.2}]'
             raise error(f"{str(cause)[:-1]} of dicts, such as {example}.") from None
-        pairs = [(_name(changes, what, error), changes) for changes in several]
+        pairs = [(_name(changes, what, error), changes) for changes in entries_of_list]
     if not pairs:
         raise error(f"{what} is empty: give at least one dict of fields, or leave it out.")
-    named: Named = {}
+    settings_by_name: Named = {}
     if not any(not changes for _, changes in pairs):
-        named[_AS_GIVEN] = {}
+        settings_by_name[_AS_GIVEN] = {}
     for name, changes in pairs:
         for field in changes:
             if not isinstance(field, str) or field not in (*IN_PROBLEM, *_METHOD):
-                known = ", ".join((*IN_PROBLEM, *_METHOD))
+                known_fields = ", ".join((*IN_PROBLEM, *_METHOD))
                 raise error(
-                    f"{what}: {value_text(field)} is no choice of method; give one of {known}. "
-                    "Meshes go into meshes=, loads into states=."
+                    f"{what}: {value_text(field)} is no choice of method; give one of "
+                    f"{known_fields}. Meshes go into meshes=, loads into states=."
                 )
-        if name in named:
+        if name in settings_by_name:
             raise error(f"{what}: {value_text(name)} stands there twice; leave one out.")
-        named[name] = dict(changes)
-    return named
+        settings_by_name[name] = dict(changes)
+    return settings_by_name
 
 
 def _name(changes: Any, what: str, error: type[XcrackError]) -> str:
@@ -109,17 +109,17 @@ def default_settings(problem: Problem) -> Named:
     ----------
     problem : Problem
     """
-    named: dict[str, dict[str, Any]] = {_AS_GIVEN: {}}
+    settings_by_name: dict[str, dict[str, Any]] = {_AS_GIVEN: {}}
     for name, changes in _DEFAULT[problem.mesh.dim].items():
         if name == "other order":
             other = 3 - (problem.order or 1)
-            named[f"order {other}"] = {"order": other}
-        elif any(crack.n_tips for crack in problem.placed) and not _same(problem, changes):
-            named[name] = changes
-    return named
+            settings_by_name[f"order {other}"] = {"order": other}
+        elif any(crack.n_tips for crack in problem.placed) and not _is_same(problem, changes):
+            settings_by_name[name] = changes
+    return settings_by_name
 
 
-def _same(problem: Problem, changes: dict[str, Any]) -> bool:
+def _is_same(problem: Problem, changes: dict[str, Any]) -> bool:
     """Whether the problem has these settings already, or no radius that they could vary."""
     method = problem.numerics
     if method.enrichment == "topological" and "enrichment" not in changes:
@@ -147,7 +147,7 @@ def with_lengths(changes: dict[str, Any], radius: float | None) -> tuple[dict[st
 # --- meshes of a chart: those given, those made by a function, and how fine they are ---
 
 
-def made(maker: Callable[[float], Mesh], size: float) -> Mesh:
+def make_mesh(maker: Callable[[float], Mesh], size: float) -> Mesh:
     """A mesh of a size from a user's function."""
     mesh = call_function(maker, "the meshes of chart", size)
     if not isinstance(mesh, Mesh):
@@ -158,9 +158,9 @@ def made(maker: Callable[[float], Mesh], size: float) -> Mesh:
     return mesh
 
 
-def checked_meshes(problem: Problem, given: Any) -> list[Mesh]:
+def checked_meshes(problem: Problem, meshes: Any) -> list[Mesh]:
     """The meshes that were given, if they go from coarse to fine."""
-    every = list(given) if isinstance(given, Iterable) and not isinstance(given, str) else []
+    every = list(meshes) if isinstance(meshes, Iterable) and not isinstance(meshes, str) else []
     if len(every) < 2 or not all(isinstance(mesh, Mesh) for mesh in every):
         raise ProblemError(
             "meshes: give two or more meshes from coarse to fine, or a function of the size: the "
@@ -196,7 +196,7 @@ __all__ = [
     "Named",
     "checked_meshes",
     "default_settings",
-    "made",
+    "make_mesh",
     "mean_size",
     "named_settings",
     "smallest",

@@ -81,15 +81,17 @@ def plain(values: Any) -> Sampled:
     ProblemError
         No numbers.
     """
-    flat = numbers(values, "chart: what the quantity returned", finite=False).reshape(-1, 1)
-    if not len(flat):
+    column = numbers(values, "chart: what the quantity returned", must_be_finite=False).reshape(
+        -1, 1
+    )
+    if not len(column):
         raise ProblemError("the quantity returned an empty array: return at least one number.")
-    if np.abs(flat[np.isfinite(flat)]).max(initial=0.0) > _LARGEST:
+    if np.abs(column[np.isfinite(column)]).max(initial=0.0) > _LARGEST:
         raise ProblemError(
-            f"the quantity returned values of up to {np.abs(flat).max():.3g}, whose squares are no "
-            "numbers: return it in another unit."
+            f"the quantity returned values of up to {np.abs(column).max():.3g}, whose squares are "
+            "no numbers: return it in another unit."
         )
-    return Sampled(flat)
+    return Sampled(column)
 
 
 def at_places(sample: Sampled, places: Sampled) -> Floats:
@@ -110,19 +112,19 @@ def at_places(sample: Sampled, places: Sampled) -> Floats:
             )
         return sample.values.ravel()
     group_of_places = places.group if places.group is not None else sample.group
-    here, there = (np.unique(group, axis=0) for group in (sample.group, group_of_places))
-    if not np.array_equal(here, there):
+    groups, place_groups = (np.unique(group, axis=0) for group in (sample.group, group_of_places))
+    if not np.array_equal(groups, place_groups):
         raise ProblemError(
-            f"{len(here)} tip(s) or front(s) here, {len(there)} in the reference: another crack. "
-            "An end within half a cell of the boundary is a mouth; take finer meshes."
+            f"{len(groups)} tip(s) or front(s) here, {len(place_groups)} in the reference: "
+            "another crack. An end within half a cell of the boundary is a mouth; take finer ones."
         )
     inner = ~np.asarray(places.at_surface)
     inner = inner if inner.any() else np.ones_like(inner)
     result = np.zeros((int(inner.sum()), sample.values.shape[1]))
     # By crack, not by front: fronts of one crack may be numbered otherwise in another mesh.
     for c in np.unique(group_of_places[:, 0]):
-        mine = group_of_places[inner, 0] == c
-        result[mine] = _nearest(sample, int(c), places.points[inner][mine])
+        is_of_crack = group_of_places[inner, 0] == c
+        result[is_of_crack] = _nearest(sample, int(c), places.points[inner][is_of_crack])
     return result.ravel()
 
 
@@ -132,11 +134,11 @@ def _nearest(sample: Sampled, crack: int, x: Floats) -> Floats:
     assert sample.group is not None
     ends = _segments(sample.points, sample.group, crack)
     a, b = sample.points[ends].transpose(1, 0, 2)
-    along = b - a
-    square = np.einsum("sd,sd->s", along, along)
-    share = np.einsum("xsd,sd->xs", x[:, None] - a, along) / np.where(square > 0, square, 1.0)
+    segment = b - a
+    square = np.einsum("sd,sd->s", segment, segment)
+    share = np.einsum("xsd,sd->xs", x[:, None] - a, segment) / np.where(square > 0, square, 1.0)
     share = np.clip(share, 0.0, 1.0)
-    distance = np.linalg.norm(a + share[..., None] * along - x[:, None], axis=-1)
+    distance = np.linalg.norm(a + share[..., None] * segment - x[:, None], axis=-1)
     best = np.argmin(distance, axis=1)
     t = share[np.arange(len(x)), best][:, None]
     first, last = sample.values[ends[best]].transpose(1, 0, 2)
@@ -180,16 +182,22 @@ def remaining(values: Sequence[Floats], sizes: Sequence[float]) -> float:
     last = ratio[-1]
     if len(change) == 1:
         return change[-1] / (last**_UNKNOWN - 1)
-    before, now = change[-2:]
+    previous_change, last_change = change[-2:]
     rate = _FASTEST
-    if now > 0:
-        rate = float(np.clip(np.log(max(before, 1e-300) / now) / np.log(last), _SLOWEST, _FASTEST))
-    lucky = before / (ratio[-2] ** _FASTEST - 1) / last**_FASTEST
-    return max(now / (last**rate - 1), lucky)
+    if last_change > 0:
+        rate = float(
+            np.clip(
+                np.log(max(previous_change, 1e-300) / last_change) / np.log(last),
+                _SLOWEST,
+                _FASTEST,
+            )
+        )
+    lucky = previous_change / (ratio[-2] ** _FASTEST - 1) / last**_FASTEST
+    return max(last_change / (last**rate - 1), lucky)
 
 
 def most_trusted(
-    values: Mapping[tuple[int, int], Floats], sizes: Sequence[float], outside: Sequence[int] = ()
+    values: Mapping[tuple[int, int], Floats], sizes: Sequence[float], left_out: Sequence[int] = ()
 ) -> tuple[tuple[int, int], float]:
     """The run that the others are compared with, and the error that is left in it.
 
@@ -202,7 +210,7 @@ def most_trusted(
         Of runs that succeeded.
     sizes : sequence of float, length
         One a mesh, from coarse to fine.
-    outside : sequence of int
+    left_out : sequence of int
         Settings that are no candidates.
 
     Raises
@@ -210,25 +218,25 @@ def most_trusted(
     ProblemError
         No setting that ran on the finest mesh and on another one.
     """
-    finest = max((mesh for mesh, s in values if s not in outside), default=-1)
-    claims = []
+    finest_mesh = max((mesh for mesh, s in values if s not in left_out), default=-1)
+    candidates = []
     for mesh, setting in values:
         meshes = sorted(m for m, s in values if s == setting)
-        if mesh == finest and len(meshes) > 1 and setting not in outside:
-            left = remaining([values[m, setting] for m in meshes], [sizes[m] for m in meshes])
-            claims.append((left, setting))
-    if not claims:
+        if mesh == finest_mesh and len(meshes) > 1 and setting not in left_out:
+            remainder = remaining([values[m, setting] for m in meshes], [sizes[m] for m in meshes])
+            candidates.append((remainder, setting))
+    if not candidates:
         raise ProblemError(
             "no setting ran on two meshes, so that no error can be estimated: give finer meshes "
             "or settings that suit the scene."
         )
-    claims.sort()
-    error, best = claims[0]
-    if len(claims) > 1 and claims[1][0] <= _PEER * error:
-        left, second = claims[1]
-        apart = float(np.linalg.norm(values[finest, second] - values[finest, best]))
-        error = max(error, apart - left)
-    return (finest, best), error
+    candidates.sort()
+    error, best = candidates[0]
+    if len(candidates) > 1 and candidates[1][0] <= _PEER * error:
+        remainder, second = candidates[1]
+        difference = float(np.linalg.norm(values[finest_mesh, second] - values[finest_mesh, best]))
+        error = max(error, difference - remainder)
+    return (finest_mesh, best), error
 
 
 __all__ = ["K_of_all", "Sampled", "at_places", "most_trusted", "plain", "remaining", "sampled"]

@@ -112,12 +112,12 @@ class ArcCrack:
         d2 = -g2 / X0
         d1 = -d2 * X1 / X0
         # Phi = G at infinity, where F has no 1 / z, and Omega there is the conjugate of Phi(0).
-        known = 0.5 * (-ca * X0 * 2 * G + d1 * X1 + d2 * X2)
+        imposed_part = 0.5 * (-ca * X0 * 2 * G + d1 * X1 + d2 * X2)
         factor = 0.5 * (ca * X0 + 1)  # real
-        right = G - np.conj(known)
-        g0 = right.real / (1 + factor)
+        rhs = G - np.conj(imposed_part)
+        g0 = rhs.real / (1 + factor)
         if abs(1 - factor) > 1e-14:
-            g0 = g0 + 1j * right.imag / (1 - factor)
+            g0 = g0 + 1j * rhs.imag / (1 - factor)
         c1 = 2 * G - g0
         return c1, -ca * c1, d1, d2, g0
 
@@ -136,8 +136,10 @@ class ArcCrack:
         """K_I and K_II at the tip of that sign: s_rr + i s_rt is F on the circle ahead of it."""
         c1, c0, d1, d2, _ = self._coefficients
         tip, distance = np.exp(1j * sign * self.alpha), 1e-8
-        ahead = np.array([tip * np.exp(1j * sign * distance)])
-        limit = (c1 * tip + c0 + d1 / tip + d2 / tip**2) / self._q(ahead)[0] * np.sqrt(distance)
+        point_ahead = np.array([tip * np.exp(1j * sign * distance)])
+        limit = (
+            (c1 * tip + c0 + d1 / tip + d2 / tip**2) / self._q(point_ahead)[0] * np.sqrt(distance)
+        )
         K = np.sqrt(2 * np.pi) * np.sqrt(self.R) * limit
         return float(K.real), float(-K.imag)
 

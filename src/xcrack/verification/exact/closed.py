@@ -56,9 +56,9 @@ def closed_crack(
     """
     if syy > 0:
         raise ProblemError(f"closed_crack: syy = {syy:g} opens the crack; use griffith")
-    sliding = float(np.sign(sxy) * max(abs(sxy) - mu_f * abs(syy), 0.0))
-    u_crack, s_crack = griffith(x, y, a, E, nu, 0.0, 0.0, sliding, plane, side)
-    u_body, s_body = uniform_stress(x, y, sxx, syy, sxy - sliding, E, nu, plane)
+    shear = float(np.sign(sxy) * max(abs(sxy) - mu_f * abs(syy), 0.0))
+    u_crack, s_crack = griffith(x, y, a, E, nu, 0.0, 0.0, shear, plane, side)
+    u_body, s_body = uniform_stress(x, y, sxx, syy, sxy - shear, E, nu, plane)
     return u_crack + u_body, s_crack + s_body
 
 

@@ -120,9 +120,9 @@ def inclined_remote(
         K_I = across sqrt(pi a), K_II = shear sqrt(pi a) of a crack of length 2 a.
     """
     s, c = np.sin(angle), np.cos(angle)
-    along = stress * (c * c + transverse * s * s)
-    across = stress * (s * s + transverse * c * c)
-    return along, across, stress * (1 - transverse) * s * c
+    stress_along = stress * (c * c + transverse * s * s)
+    stress_across = stress * (s * s + transverse * c * c)
+    return stress_along, stress_across, stress * (1 - transverse) * s * c
 
 
 def periodic_K(a: float, W: float, stress: float = 1.0) -> float:
@@ -230,8 +230,8 @@ def slip_patch(
     X, Y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
     u_up, stress_up = uniform_stress(X, Y, s_up, -p, 0.0, E, nu, plane)
     u_lo, stress_lo = uniform_stress(X, Y, s_lo, -p, 0.0, E, nu, plane)
-    above = (Y >= 0)[..., None]
+    is_above = (Y >= 0)[..., None]
     return (
-        np.where(above, u_up + np.array([shift, 0]), u_lo),
-        np.where(above, stress_up, stress_lo),
+        np.where(is_above, u_up + np.array([shift, 0]), u_lo),
+        np.where(is_above, stress_up, stress_lo),
     )

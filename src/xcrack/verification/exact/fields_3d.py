@@ -67,13 +67,13 @@ def crack_displacement(
     z, side = np.abs(x[..., 2]), np.where(x[..., 2] < 0, -1.0, 1.0)
     b, c = -1 / (2 * (1 - nu)), (1 - 2 * nu) / (2 * (1 - nu))
     if mode == "n":
-        along = b * ((1 - 2 * nu) * h["x"] + z * h["xz"])
-        across = b * ((1 - 2 * nu) * h["y"] + z * h["yz"])
+        u_along = b * ((1 - 2 * nu) * h["x"] + z * h["xz"])
+        u_across = b * ((1 - 2 * nu) * h["y"] + z * h["yz"])
         opening = b * (-2 * (1 - nu) * h["g"] + z * h["zz"])
-        return np.stack([along, across, side * opening], -1)
+        return np.stack([u_along, u_across, side * opening], -1)
     slip = h["g"] + b * z * h["xx"]
-    across = b * z * h["xy"]
-    return np.stack([side * slip, side * across, b * z * h["xz"] + c * h["x"]], -1)
+    u_across = b * z * h["xy"]
+    return np.stack([side * slip, side * u_across, b * z * h["xz"] + c * h["x"]], -1)
 
 
 def penny(
@@ -103,15 +103,15 @@ def penny(
     mu = shear_modulus(E, nu)
     u, _ = uniform_stress_3d(points, S, E, nu)
     shear = float(np.hypot(S[0, 2], S[1, 2]))
-    sliding = _sliding(shear, float(S[2, 2]), friction)
+    sliding_shear = _sliding_shear(shear, float(S[2, 2]), friction)
     opening = 2 * (1 - nu) * max(float(S[2, 2]), 0.0) / (np.pi * mu)
     u = u + opening * crack_displacement(points, _penny_harmonic(points, a), "n", nu)
-    if sliding > 0:
+    if sliding_shear > 0:
         c, s = S[0, 2] / shear, S[1, 2] / shear
         Q = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])  # rows: along the slip, across, normal
         local = points @ Q.T
         slip = crack_displacement(local, _penny_harmonic(local, a), "x", nu)
-        u = u + 4 * (1 - nu) * sliding / (np.pi * (2 - nu) * mu) * slip @ Q
+        u = u + 4 * (1 - nu) * sliding_shear / (np.pi * (2 - nu) * mu) * slip @ Q
     return u
 
 
@@ -138,11 +138,11 @@ def penny_K(
         K_III along (-sin omega, cos omega).
     """
     root = np.sqrt(a / np.pi)
-    sliding = _sliding(tau, szz, friction)
+    sliding_shear = _sliding_shear(tau, szz, friction)
     return (
         np.asarray(2 * max(szz, 0.0) * root + 0 * omega),
-        np.asarray(4 / (2 - nu) * sliding * root * np.cos(omega)),
-        np.asarray(-4 * (1 - nu) / (2 - nu) * sliding * root * np.sin(omega)),
+        np.asarray(4 / (2 - nu) * sliding_shear * root * np.cos(omega)),
+        np.asarray(-4 * (1 - nu) / (2 - nu) * sliding_shear * root * np.sin(omega)),
     )
 
 
@@ -259,15 +259,15 @@ def ellipse_displacement(
     u, _ = uniform_stress_3d(points, S, E, nu)
     u = u + w_z * crack_displacement(points, h, "n", nu)
     u = u + w_x * crack_displacement(points, h, "x", nu)
-    turned = {
+    by_axis = {
         "g": h["g"], "x": h["y"], "y": -h["x"], "xx": h["yy"], "yy": h["xx"], "xy": -h["xy"],
         "zz": h["zz"], "xz": h["yz"], "yz": -h["xz"],
     }  # fmt: skip
-    slip = w_y * crack_displacement(points, turned, "x", nu)
+    slip = w_y * crack_displacement(points, by_axis, "x", nu)
     return np.asarray(u + np.stack([-slip[..., 1], slip[..., 0], slip[..., 2]], -1))
 
 
-def _sliding(tau: float, szz: float, friction: float | None) -> float:
+def _sliding_shear(tau: float, szz: float, friction: float | None) -> float:
     """Shear that friction does not carry."""
     if friction is None or szz >= 0:
         return tau
@@ -278,20 +278,20 @@ def _penny_harmonic(x: Floats, a: float) -> Derivatives:
     """Derivatives of the h whose h_z on the face is sqrt(a² - r²)."""
     z = np.abs(x[..., 2])
     r = np.maximum(np.hypot(x[..., 0], x[..., 1]), 1e-12 * a)
-    far, near = np.sqrt((r + a) ** 2 + z * z), np.sqrt((r - a) ** 2 + z * z)
-    outer = (far + near) / 2
+    far_distance, near_distance = np.sqrt((r + a) ** 2 + z * z), np.sqrt((r - a) ** 2 + z * z)
+    outer = (far_distance + near_distance) / 2
     inner = a * r / outer
-    difference = np.maximum(far * near, 1e-300)  # outer² - inner²
-    below = np.sqrt(np.maximum(a * a - inner * inner, 0))
-    above = np.sqrt(np.maximum(outer * outer - a * a, 0))
+    difference = np.maximum(far_distance * near_distance, 1e-300)  # outer² - inner²
+    root_in = np.sqrt(np.maximum(a * a - inner * inner, 0))
+    root_out = np.sqrt(np.maximum(outer * outer - a * a, 0))
     angle = np.arcsin(np.minimum(a / outer, 1))
-    h_r = r / 2 * (angle - a * above / outer**2)
-    h_zz = -angle + a * above / difference
-    h_rz = -r * a * a * below / (outer**2 * difference)
+    h_r = r / 2 * (angle - a * root_out / outer**2)
+    h_zz = -angle + a * root_out / difference
+    h_rz = -r * a * a * root_in / (outer**2 * difference)
     h_rr = -h_zz - h_r / r
     c, s = x[..., 0] / r, x[..., 1] / r
     return {
-        "g": below - z * angle, "x": h_r * c, "y": h_r * s, "xx": h_rr * c * c + h_r / r * s * s,
+        "g": root_in - z * angle, "x": h_r * c, "y": h_r * s, "xx": h_rr * c * c + h_r / r * s * s,
         "yy": h_rr * s * s + h_r / r * c * c, "xy": (h_rr - h_r / r) * c * s, "zz": h_zz,
         "xz": h_rz * c, "yz": h_rz * s,
     }  # fmt: skip

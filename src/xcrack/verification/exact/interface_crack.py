@@ -63,27 +63,27 @@ def displacement(
     a_1, a_2 = _slopes(upper, lower, plane)
     epsilon, a = oscillation(upper, lower, plane), half_length
     scale = pressure * a_1 * a_2 / (a_1 + a_2)
-    above: Bools = np.asarray(x[:, 1] >= 0)
+    is_above: Bools = np.asarray(x[:, 1] >= 0)
     z: Complexes = x[:, 0] + 1j * x[:, 1]
 
-    def logarithm(w: Complexes, above: Bools) -> Complexes:
+    def logarithm(w: Complexes, is_upper: Bools) -> Complexes:
         angle = np.angle(w)
-        angle = np.where(above & (angle < 0), angle + 2 * np.pi, angle)
-        return np.log(np.abs(w)) + 1j * np.where(~above & (angle > 0), angle - 2 * np.pi, angle)
+        angle = np.where(is_upper & (angle < 0), angle + 2 * np.pi, angle)
+        return np.log(np.abs(w)) + 1j * np.where(~is_upper & (angle > 0), angle - 2 * np.pi, angle)
 
-    def integral(z: Complexes, above: Bools) -> Complexes:
-        left, right = logarithm(z + a, above), logarithm(z - a, above)
-        power = np.exp((0.5 - 1j * epsilon) * right + (0.5 + 1j * epsilon) * left)
+    def integral(z: Complexes, is_upper: Bools) -> Complexes:
+        log_left, log_right = logarithm(z + a, is_upper), logarithm(z - a, is_upper)
+        power = np.exp((0.5 - 1j * epsilon) * log_right + (0.5 + 1j * epsilon) * log_left)
         return np.asarray(scale * (power - z))
 
-    left, right = logarithm(z + a, above), logarithm(z - a, above)
-    power = np.exp((-0.5 - 1j * epsilon) * right + (-0.5 + 1j * epsilon) * left)
+    log_below, log_above = logarithm(z + a, is_above), logarithm(z - a, is_above)
+    power = np.exp((-0.5 - 1j * epsilon) * log_above + (-0.5 + 1j * epsilon) * log_below)
     slope = scale * ((z - 2j * epsilon * a) * power - 1)
-    near, other = np.where(above, a_1, a_2), np.where(above, a_2, a_1)
-    k = np.where(above, kolosov(upper[1], plane), kolosov(lower[1], plane))
-    mu = np.where(above, shear_modulus(*upper), shear_modulus(*lower))
-    phi, omega = integral(z, above) / near, integral(np.conj(z), ~above) / other
-    u = (k * phi - omega - (z - np.conj(z)) * np.conj(slope / near)) / (2 * mu)
+    own_factor, other = np.where(is_above, a_1, a_2), np.where(is_above, a_2, a_1)
+    k = np.where(is_above, kolosov(upper[1], plane), kolosov(lower[1], plane))
+    mu = np.where(is_above, shear_modulus(*upper), shear_modulus(*lower))
+    phi, omega = integral(z, is_above) / own_factor, integral(np.conj(z), ~is_above) / other
+    u = (k * phi - omega - (z - np.conj(z)) * np.conj(slope / own_factor)) / (2 * mu)
     return np.stack([u.real, u.imag], axis=1)
 
 

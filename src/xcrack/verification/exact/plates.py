@@ -318,8 +318,8 @@ def newman_raju_at_hole(phi: ArrayLike, a: float, c: float, t: float, R: float) 
     g2 = (1 - 0.15 * lam + 3.46 * lam**2 - 4.47 * lam**3 + 3.52 * lam**4) / (1 + 0.13 * lam**2)
     g3 = (1 + 0.04 * r) * (1 + 0.1 * (1 - cosine) ** 2) * (0.8 + 0.2 * q**0.25)
     ellipse = (r * r * cosine**2 + sine**2) ** 0.25
-    single = np.sqrt((4 / np.pi + a * c / (2 * t * R)) / (4 / np.pi + a * c / (t * R)))
-    F = (M1 + M2 * q**2 + M3 * q**4) * g1 * g2 * g3 * ellipse * single
+    one_side = np.sqrt((4 / np.pi + a * c / (2 * t * R)) / (4 / np.pi + a * c / (t * R)))
+    F = (M1 + M2 * q**2 + M3 * q**4) * g1 * g2 * g3 * ellipse * one_side
     return np.asarray(np.sqrt(np.pi * a / (1 + 1.464 * r**1.65)) * F)
 
 

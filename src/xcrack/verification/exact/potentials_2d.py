@@ -123,7 +123,7 @@ def potential_field(
     w = (kappa * phi - z * np.conj(Phi) - np.conj(psi)) / (2 * mu)
     trace = 4 * Phi.real
     difference = 2 * (np.conj(z) * dPhi + Psi)  # s_yy - s_xx + 2 i s_xy
-    return _packed(w, trace, (trace + difference.real) / 2, difference.imag / 2)
+    return _pack(w, trace, (trace + difference.real) / 2, difference.imag / 2)
 
 
 def westergaard_field(
@@ -154,7 +154,7 @@ def westergaard_field(
     """
     kappa, mu = kolosov(nu, plane), shear_modulus(E, nu)
 
-    def mixed(first: Function | None, second: Function | None, at: Complexes) -> Complexes:
+    def mix_modes(first: Function | None, second: Function | None, at: Complexes) -> Complexes:
         total = np.zeros_like(at)
         if first is not None:
             total = total + first(at) / 2
@@ -163,14 +163,14 @@ def westergaard_field(
         return total
 
     mirrored = np.conj(z)
-    phi, Phi = mixed(integral_I, integral_II, z), mixed(Z_I, Z_II, z)
-    dPhi = mixed(slope_I, slope_II, z)
-    omega, Omega = mixed(integral_I, integral_II, mirrored), mixed(Z_I, Z_II, mirrored)
+    phi, Phi = mix_modes(integral_I, integral_II, z), mix_modes(Z_I, Z_II, z)
+    dPhi = mix_modes(slope_I, slope_II, z)
+    omega, Omega = mix_modes(integral_I, integral_II, mirrored), mix_modes(Z_I, Z_II, mirrored)
     phi, Phi = phi + T * z / 4, Phi + T / 4
     omega, Omega = omega - T * mirrored / 4, Omega - T / 4
     w = (kappa * phi - omega - (z - mirrored) * np.conj(Phi)) / (2 * mu)
-    across = Phi + Omega + (z - mirrored) * np.conj(dPhi)  # s_yy - i s_xy
-    return _packed(w, 4 * Phi.real, across.real, -across.imag)
+    traction = Phi + Omega + (z - mirrored) * np.conj(dPhi)  # s_yy - i s_xy
+    return _pack(w, 4 * Phi.real, traction.real, -traction.imag)
 
 
 def uniform_stress(
@@ -201,7 +201,7 @@ def uniform_stress(
     return u, np.stack([sxx + 0 * X, syy + 0 * X, sxy + 0 * X], -1)
 
 
-def _packed(w: Complexes, trace: Floats, syy: Floats, sxy: Floats) -> Values:
+def _pack(w: Complexes, trace: Floats, syy: Floats, sxy: Floats) -> Values:
     """Displacement and stress of u + i v, s_xx + s_yy, s_yy and s_xy."""
     return np.stack([w.real, w.imag], -1), np.stack([trace - syy, syy, sxy], -1)
 

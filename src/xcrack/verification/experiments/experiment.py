@@ -87,11 +87,13 @@ def read_experiment(name: str, folder: Path | None = None) -> Experiment:
     """
     text = files(__package__).joinpath(_DATA, f"{name}.toml").read_text(encoding="utf-8")
     content = tomllib.loads(text)
-    measured = content.pop("measured")
+    measurements = content.pop("measured")
     for key in ("recalled", "remarks"):
         content[key] = tuple(content[key])
     others = tuple(content.pop("other", ()))
-    return Experiment(**content, measured={**measured, **_given(name, folder)}, others=others)
+    return Experiment(
+        **content, measured={**measurements, **_measured_by_user(name, folder)}, others=others
+    )
 
 
 def experiment_names() -> tuple[str, ...]:
@@ -100,7 +102,7 @@ def experiment_names() -> tuple[str, ...]:
     return tuple(sorted(e.name[: -len(".toml")] for e in entries if e.name.endswith(".toml")))
 
 
-def _given(name: str, folder: Path | None) -> dict[str, Any]:
+def _measured_by_user(name: str, folder: Path | None) -> dict[str, Any]:
     """Measured numbers of a file of the user's; empty where there is none."""
     path = None if folder is None else folder / f"{name}.toml"
     if path is None or not path.is_file():
@@ -111,10 +113,10 @@ def _given(name: str, folder: Path | None) -> dict[str, Any]:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ProblemError(f"validate: {path} is no toml: {error}.") from error
-    measured = content.get("measured", {})
-    if not isinstance(measured, dict):
+    measurements = content.get("measured", {})
+    if not isinstance(measurements, dict):
         raise ProblemError(f"validate: measured in {path} is no table: write [measured].")
-    return dict(measured)
+    return dict(measurements)
 
 
 # --- how a test is predicted: what the trials share ---
@@ -155,13 +157,13 @@ def grown(
 def outline(mesh: Mesh) -> list[Curve]:
     """Boundary of a body in the plane, as chains of edges."""
     edges = mesh.boundary
-    following = {int(a): int(b) for a, b in _oriented(mesh, edges)}
+    next_point = {int(a): int(b) for a, b in _oriented(mesh, edges)}
     curves = []
-    while following:
-        first = next(iter(following))
+    while next_point:
+        first = next(iter(next_point))
         chain = [first]
-        while chain[-1] in following:
-            chain.append(following.pop(chain[-1]))
+        while chain[-1] in next_point:
+            chain.append(next_point.pop(chain[-1]))
         curves.append(Curve.of("", mesh.points[chain], "body"))
     return curves
 
@@ -169,9 +171,9 @@ def outline(mesh: Mesh) -> list[Curve]:
 def _oriented(mesh: Mesh, edges: Ints) -> Ints:
     """Boundary edges with the body on their left."""
     cell = mesh.facet_to_cell[mesh.facet_numbers(edges), 0]
-    inside = mesh.points[mesh.cells[cell]].mean(axis=1) - mesh.points[edges[:, 0]]
-    along = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
-    is_left = along[:, 0] * inside[:, 1] - along[:, 1] * inside[:, 0] > 0
+    towards_cell = mesh.points[mesh.cells[cell]].mean(axis=1) - mesh.points[edges[:, 0]]
+    edge = mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]]
+    is_left = edge[:, 0] * towards_cell[:, 1] - edge[:, 1] * towards_cell[:, 0] > 0
     return np.where(is_left[:, None], edges, edges[:, ::-1])
 
 
@@ -211,9 +213,9 @@ def by_others(
     for other in experiment.others:
         start = f"by {other['program']}: "
         if points is not None and "path" in other:
-            away = distances(points, np.array(other["path"]))
+            deviation = distances(points, np.array(other["path"]))
             name = f"{start}distance of the path, rms{where}"
-            rows.append(Comparison(name, rms(away), unit="mm"))
+            rows.append(Comparison(name, rms(deviation), unit="mm"))
         for key, words, unit in _OF_OTHERS if not where else ():
             values = np.atleast_1d(other.get(key, []))
             rows += [Comparison(start + words, float(v), measure="number", unit=unit)

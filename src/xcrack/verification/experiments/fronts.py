@@ -35,8 +35,8 @@ def _bent_bar(experiment: Experiment) -> Problem:
 
     def size(x: Floats) -> Floats:
         y = np.maximum(first - 1.5 * _CELL - x[:, 1], x[:, 1] - last - 2.0 * _CELL)
-        away = np.hypot(np.maximum(y, 0.0), np.maximum(np.abs(x[:, 0]) - 2.5 * _CELL, 0.0))
-        return np.asarray(1.75 * _CELL + 0.7 * away)
+        distance = np.hypot(np.maximum(y, 0.0), np.maximum(np.abs(x[:, 0]) - 2.5 * _CELL, 0.0))
+        return np.asarray(1.75 * _CELL + 0.7 * distance)
 
     def bending_stress(x: Floats) -> Floats:
         return np.stack([1.0 - 2.0 * x[:, 1] / width, *np.zeros((2, len(x)))], axis=1)
@@ -44,8 +44,8 @@ def _bent_bar(experiment: Experiment) -> Problem:
     lower = (-length / 2 + _ASIDE, 0.0, 0.0)
     upper = (length / 2 + _ASIDE, width, thickness)
     mesh = refine(box(lower, upper, (10, 7, 4)), size=size)
-    around = [(-1.0, -1.0), (first, -1.0), (first, thickness + 1.0), (-1.0, thickness + 1.0)]
-    crack = plane_crack([(0.0, y, z) for y, z in around])
+    corners = [(-1.0, -1.0), (first, -1.0), (first, thickness + 1.0), (-1.0, thickness + 1.0)]
+    crack = plane_crack([(0.0, y, z) for y, z in corners])
     loads = [traction("right", bending_stress), traction("left", lambda x: -bending_stress(x))]
     return Problem(mesh, Isotropic(material["E"], material["nu"]), [crack], loads=loads)
 
@@ -54,8 +54,8 @@ def _angle_at_ends(front: Floats, reach: float) -> float:
     """Angle in degrees between a front (n, 2) of depth over thickness and the surface's normal."""
     angles = []
     for end in (front[0, 1], front[-1, 1]):
-        near = front[np.abs(front[:, 1] - end) <= reach]
-        slope = np.polyfit(np.abs(near[:, 1] - end), near[:, 0], 1)[0]
+        points_near_end = front[np.abs(front[:, 1] - end) <= reach]
+        slope = np.polyfit(np.abs(points_near_end[:, 1] - end), points_near_end[:, 0], 1)[0]
         angles.append(np.degrees(np.arctan(slope)))
     return float(np.mean(angles))
 
@@ -73,13 +73,13 @@ def _run_bar(experiment: Experiment, quick: bool) -> Outcome:
         fronts.append(answer.x[order, 1:])
         spread = float(np.ptp(answer.K_I) / answer.K_I.max())
     angles = [_angle_at_ends(front, _NEAR * thickness) for front in fronts]
-    measured = experiment.measured["angle"]
+    measured_angle = experiment.measured["angle"]
     end, reach = fronts[-1][0], 0.1 * thickness
-    slope = np.tan(np.radians(measured))
+    slope = np.tan(np.radians(measured_angle))
     tangent = end[::-1] + np.linspace(0.0, reach, 6)[:, None] * np.array([1.0, slope])
     comparisons = (
         Comparison("angle of the steady front at the surface", float(np.mean(angles[-3:])),
-                   measured, "difference", "degrees", -_BEND, _BEND),
+                   measured_angle, "difference", "degrees", -_BEND, _BEND),
         Comparison("K along the steady front: largest less least, over largest", spread,
                    measure="number", most=0.05),
         Comparison("bow of the steady front over the thickness",
@@ -97,10 +97,10 @@ def _run_bar(experiment: Experiment, quick: bool) -> Outcome:
         Picture("Fronts", "z through the thickness [mm]", "depth [mm]", (
             *(Curve.of("" if k else "predicted", f[:, ::-1], "predicted")
               for k, f in enumerate(fronts)),
-            Curve.of(f"{measured:g} degrees, measured", tangent, "measured"))),
+            Curve.of(f"{measured_angle:g} degrees, measured", tangent, "measured"))),
         Picture("Angle at the surface", "growth [mm]", "angle [degrees]", (
             Curve.of("predicted", growth, "predicted"),
-            Curve.of("measured", [(x, measured) for x in advance], "measured"), *others)),
+            Curve.of("measured", [(x, measured_angle) for x in advance], "measured"), *others)),
     )  # fmt: skip
     return Outcome(experiment.name, (experiment.name,), comparisons, pictures, _BOWED)
 
@@ -116,16 +116,16 @@ def _sheared_block(experiment: Experiment) -> Problem:
     """A block in shear with a half penny in z = 0 at its side y = 0; it shears along x."""
     material, radius = experiment.material, experiment.geometry["radius"]
     width, depth, height = experiment.geometry["block"]
-    near = radius / _CELLS
+    cell = radius / _CELLS
 
     def size(x: Floats) -> Floats:
-        ring = np.abs(np.hypot(x[:, 0], x[:, 1]) - radius) - 3.0 * near
-        away = np.hypot(np.maximum(ring, 0.0), np.maximum(np.abs(x[:, 2]) - 3.0 * near, 0.0))
-        return np.asarray(1.75 * near + 0.7 * away)
+        ring = np.abs(np.hypot(x[:, 0], x[:, 1]) - radius) - 3.0 * cell
+        distance = np.hypot(np.maximum(ring, 0.0), np.maximum(np.abs(x[:, 2]) - 3.0 * cell, 0.0))
+        return np.asarray(1.75 * cell + 0.7 * distance)
 
-    aside = _ASIDE * radius
-    lower = (-width / 2, 0.0, -height / 2 + aside)
-    upper = (width / 2, depth, height / 2 + aside)
+    offset = _ASIDE * radius
+    lower = (-width / 2, 0.0, -height / 2 + offset)
+    upper = (width / 2, depth, height / 2 + offset)
     mesh: Mesh = refine(box(lower, upper, (8, 4, 8)), size=size)
     shear = experiment.load["shear"]
     loads = [
@@ -142,7 +142,7 @@ def _sheared_block(experiment: Experiment) -> Problem:
 
 
 def _run_block(experiment: Experiment, quick: bool) -> Outcome:
-    nu, measured = experiment.material["nu"], experiment.measured
+    nu, results = experiment.material["nu"], experiment.measured
     answer = stress_intensity(solve(_sheared_block(experiment)))
     K, place = answer.K, np.degrees(np.arctan2(answer.x[:, 1], answer.x[:, 0]))
     order = np.argsort(place)
@@ -152,17 +152,17 @@ def _run_block(experiment: Experiment, quick: bool) -> Outcome:
     twist = np.degrees(0.5 * np.arctan2(2.0 * np.abs(K[:, 2]),
                                         (1.0 - 2.0 * nu) * np.maximum(K[:, 0], 0.0)))  # fmt: skip
     is_tilting = np.abs(K[:, 1]) > np.abs(K[:, 2])
-    ends, deepest = [0, -1], int(np.argmin(np.abs(place - 90.0)))
-    surface, depth = (measured[name] for name in ("at_surface", "at_depth"))
+    ends, deepest_point = [0, -1], int(np.argmin(np.abs(place - 90.0)))
+    surface, depth = (results[name] for name in ("at_surface", "at_depth"))
     comparisons = (
         Comparison("angle of branches at the surface, mode II", float(tilt[ends].mean()),
                    float(np.mean(surface)), "difference", "degrees", -_BRANCH, _BRANCH),
-        Comparison("angle of branches at the deepest point, mode III", float(twist[deepest]),
+        Comparison("angle of branches at the deepest point, mode III", float(twist[deepest_point]),
                    float(np.mean(depth)), "difference", "degrees", -_BRANCH, _BRANCH),
         Comparison("K_III over K_II at the surface", float(np.abs(K[ends, 2] / K[ends, 1]).mean()),
                    measure="number"),
         Comparison("K_II over K_III at the deepest point",
-                   float(np.abs(K[deepest, 1] / K[deepest, 2])), measure="number"),
+                   float(np.abs(K[deepest_point, 1] / K[deepest_point, 2])), measure="number"),
     )  # fmt: skip
     bands = [(0.0, surface[0]), (0.0, surface[1]), (180.0, surface[0]), (180.0, surface[1]),
              (90.0, depth[0]), (90.0, depth[1])]  # fmt: skip
@@ -197,12 +197,12 @@ def _tomography_block(experiment: Experiment) -> Mesh:
     """The block, x along the surface, y into the depth, z along the load: fine at the crack."""
     geometry = experiment.geometry
     lower, upper = np.array(geometry["box"]) + np.array([0.0, 0.0, _BESIDE])
-    near = geometry["depth"] / _CELLS_OF_DEPTH
+    cell = geometry["depth"] / _CELLS_OF_DEPTH
 
     def size(x: Floats) -> Floats:
-        away = np.linalg.norm(x, axis=1) - _FINE_WITHIN
-        beyond = np.hypot(np.maximum(away, 0.0), np.maximum(np.abs(x[:, 2]) - 2.5 * near, 0.0))
-        return np.asarray(1.75 * near + 0.8 * beyond)
+        distance = np.linalg.norm(x, axis=1) - _FINE_WITHIN
+        excess = np.hypot(np.maximum(distance, 0.0), np.maximum(np.abs(x[:, 2]) - 2.5 * cell, 0.0))
+        return np.asarray(1.75 * cell + 0.8 * excess)
 
     count = tuple(int(n) for n in np.rint((upper - lower) / _FAR_CELL))
     return refine(box(tuple(lower), tuple(upper), count), size=size)
@@ -215,7 +215,7 @@ def _depth(step: Step) -> float:
 
 def _run_tomography(experiment: Experiment, quick: bool) -> Outcome:
     geometry, material, load = experiment.geometry, experiment.material, experiment.load
-    stress, measured = load["stress"], experiment.measured
+    stress, results = load["stress"], experiment.measured
     a, c = geometry["depth"], geometry["half_width"]
     pull = [traction("top", (0.0, 0.0, stress)), traction("bottom", (0.0, 0.0, -stress))]
     crack = elliptic_crack((0.0, 0.0, 0.0), (0, 0, 1), (1, 0, 0), c, a)
@@ -226,25 +226,25 @@ def _run_tomography(experiment: Experiment, quick: bool) -> Outcome:
     law = paris(material["paris_C"] * 1000.0 * 1000.0 ** (-0.5 * m), m)
     history = grown(
         problem, law, Cycle(load["R"], 1.0), _STEP,
-        until=lambda step: _depth(step) > measured["depth"] + _STEP and step.cycles > measured["N"],
+        until=lambda step: _depth(step) > results["depth"] + _STEP and step.cycles > results["N"],
     )  # fmt: skip
     N = np.array([step.cycles for step in history.steps])
     depth = np.array([_depth(step) for step in history.steps])
-    predicted = float(np.interp(measured["depth"], depth, N))
+    life = float(np.interp(results["depth"], depth, N))
     fronts = [step.sif[-1][0].x[:, :2] for step in history.solved]
     comparisons = (
-        Comparison("cycles to the depth of .1733 mm", predicted, measured["N"], "ratio"),
-        Comparison("depth after 4000 cycles", float(np.interp(measured["N"], N, depth)),
-                   measured["depth"], "ratio", "mm"),
+        Comparison("cycles to the depth of .1733 mm", life, results["N"], "ratio"),
+        Comparison("depth after 4000 cycles", float(np.interp(results["N"], N, depth)),
+                   results["depth"], "ratio", "mm"),
         *by_others(experiment),
     )  # fmt: skip
     pictures = (
         Picture("Depth over cycles", "N", "depth [mm]", (
-            Curve.of("measured", [(0.0, a), (measured["N"], measured["depth"])], "measured"),
+            Curve.of("measured", [(0.0, a), (results["N"], results["depth"])], "measured"),
             Curve.of("predicted", np.stack([N, depth], axis=1), "predicted"))),
         Picture("Fronts", "x [mm]", "depth [mm]", (
             *(Curve.of("" if k else "predicted", f, "predicted") for k, f in enumerate(fronts)),
-            Curve.of("measured deepest points", [(0.0, a), (0.0, measured["depth"])], "measured")),
+            Curve.of("measured deepest points", [(0.0, a), (0.0, results["depth"])], "measured")),
             is_to_scale=True),
     )  # fmt: skip
     return Outcome(experiment.name, (experiment.name,), comparisons, pictures, _SMALL)

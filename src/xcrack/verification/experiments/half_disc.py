@@ -47,34 +47,34 @@ def _half_disc(experiment: Experiment, size: float) -> Mesh:
     )  # fmt: skip
 
 
-def _scene(experiment: Experiment, size: float, slides: bool) -> Problem:
+def _scene(experiment: Experiment, size: float, is_sliding: bool) -> Problem:
     geometry, material = experiment.geometry, experiment.material
     angle = np.radians(geometry["crack"]["angle"])
-    ahead = np.array([np.sin(angle), np.cos(angle)])
-    crack = line_crack([-0.5 * ahead, geometry["crack"]["length"] * ahead])
-    right = fix("right", axis=1) if slides else fix("right")
-    supports = [fix("left"), right, displacement("roller", cast(Any, (None, -1.0)))]
+    direction = np.array([np.sin(angle), np.cos(angle)])
+    crack = line_crack([-0.5 * direction, geometry["crack"]["length"] * direction])
+    right_support = fix("right", axis=1) if is_sliding else fix("right")
+    supports = [fix("left"), right_support, displacement("roller", cast(Any, (None, -1.0)))]
     glass = Isotropic(material["E"], material["nu"], "stress")
     return Problem(_half_disc(experiment, size), glass, [crack], supports=supports)
 
 
 def _run(experiment: Experiment, quick: bool) -> Outcome:
     size, da = _COARSE if quick else _FINE
-    measured, top = experiment.path, experiment.geometry["radius"]
-    compared = measured[measured[:, 1] <= 0.9 * top]
+    measured_path, top = experiment.path, experiment.geometry["radius"]
+    compared = measured_path[measured_path[:, 1] <= 0.9 * top]
 
-    def path_of(size: float, da: float, slides: bool = True) -> Floats:
+    def path_of(size: float, da: float, is_sliding: bool = True) -> Floats:
         history = grown(
-            _scene(experiment, size, slides), _LAW, Cycle(0.0, 1.0), da,
+            _scene(experiment, size, is_sliding), _LAW, Cycle(0.0, 1.0), da,
             until=lambda step: bool(step.cracks[0].points[-1, 1] > 0.93 * top),
         )  # fmt: skip
         return np.asarray(history.cracks[0].points[1:])
 
     path = path_of(size, da)
-    comparisons = path_comparisons(compared, path, within=(_RMS, inf))
+    comparisons = path_comparisons(compared, path, limits=(_RMS, inf))
     curves = [
         *outline(_half_disc(experiment, size)),
-        Curve.of("measured", measured, "measured"),
+        Curve.of("measured", measured_path, "measured"),
         *(Curve.of(o["program"], o["path"], "other") for o in experiment.others),
     ]
     comparisons += by_others(experiment, compared)
@@ -84,7 +84,7 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
             Comparison("bar of the predicted path: coarser cells and longer steps", bar,
                        unit="mm", measure="number")
         )  # fmt: skip
-        clamped = path_of(*_COARSE, slides=False)
+        clamped = path_of(*_COARSE, is_sliding=False)
         comparisons += path_comparisons(compared, clamped, where=", both supports held")
         curves.append(Curve.of("predicted, both supports held", clamped, "variant"))
     curves.append(Curve.of("predicted", path, "predicted"))

@@ -46,14 +46,14 @@ def _panel(experiment: Experiment, half: float) -> Problem:
 
 def _cycles(a: Floats, dK_at: tuple[Floats, Floats], constants: Floats) -> Floats:
     """Cycles from a[0] on at half lengths a, for ln C and m of a Paris law."""
-    fine = np.linspace(a[0], a[-1], 2001)
-    dK = np.exp(np.interp(fine, dK_at[0], np.log(dK_at[1])))
+    fine_a = np.linspace(a[0], a[-1], 2001)
+    dK = np.exp(np.interp(fine_a, dK_at[0], np.log(dK_at[1])))
     slowness = np.exp(-constants[0]) * dK ** -constants[1]
-    N = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(fine))])
-    return np.asarray(np.interp(a, fine, N))
+    N = np.concatenate([[0.0], np.cumsum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(fine_a))])
+    return np.asarray(np.interp(a, fine_a, N))
 
 
-def _fitted(a: Floats, mean: Floats, dK_at: tuple[Floats, Floats]) -> Floats:
+def _fit(a: Floats, mean: Floats, dK_at: tuple[Floats, Floats]) -> Floats:
     """Ln C and m of the law whose cycles are nearest to a mean curve, as shares of it."""
 
     def misfit(constants: Floats) -> Floats:
@@ -66,26 +66,26 @@ def _fitted(a: Floats, mean: Floats, dK_at: tuple[Floats, Floats]) -> Floats:
 def _run(experiment: Experiment, quick: bool) -> Outcome:
     a = np.array(experiment.measured["a"], dtype=float)
     N = np.array(experiment.measured["N"], dtype=float)  # lengths, tests
-    fitted, rest = N[:, 1::2], N[:, 0::2]
-    history, law, dK_at = _history(experiment, a, fitted.mean(axis=1), quick)
+    fitted_half, rest = N[:, 1::2], N[:, 0::2]
+    history, law, dK_at = _history(experiment, a, fitted_half.mean(axis=1), quick)
     ratio = _cycles(a, dK_at, np.array([np.log(law.C), law.m])) / np.maximum(rest.mean(axis=1), 1.0)
     end = _half(history.steps[-1])  # the last solve, within half a step of the last length
     range_of_a = (a >= _FROM) & (a <= end)
     lives_fitted, lives_other = (
-        np.array([np.interp(end, a, test) for test in half.T]) for half in (fitted, rest)
+        np.array([np.interp(end, a, test) for test in half.T]) for half in (fitted_half, rest)
     )
     sigma = float(np.std(np.log(lives_fitted), ddof=1))
     scatter = Scatter(C=lognormal(sigma))
     lives = life(history, scatter=scatter, samples=_SAMPLES, seed=_SEED)
     low, high = (lives.percentile(p) for p in _BAND)
-    covered = int(np.sum((lives_other >= low) & (lives_other <= high)))
+    n_covered = int(np.sum((lives_other >= low) & (lives_other <= high)))
     worst = float(np.abs(ratio[range_of_a] - 1.0).max())
     comparisons = (
         Comparison("largest error of the mean cycles of the other half, a ≥ 15 mm", worst,
                    measure="number", most=_MEAN),
         Comparison("mean life of the other half", float(lives.life), float(lives_other.mean()),
                    "ratio", "cycles", 1 - _MEAN, 1 + _MEAN),
-        Comparison("lives of the other half within the band of 95 %, of 34", covered,
+        Comparison("lives of the other half within the band of 95 %, of 34", n_covered,
                    measure="number", least=_HELD),
         Comparison("deviation of ln N, fitted half and other half", sigma,
                    float(np.std(np.log(lives_other), ddof=1)), "ratio"),
@@ -114,9 +114,9 @@ def _history(
 
     trial = run(paris(1e-12, 3.0), a[-1])
     tips, dK = driving(trial)
-    right = tips[:, 0] > 0
-    dK_at = tips[right, 0], dK[right]
-    constants = _fitted(a, mean, dK_at)
+    is_right = tips[:, 0] > 0
+    dK_at = tips[is_right, 0], dK[is_right]
+    constants = _fit(a, mean, dK_at)
     law = paris(float(np.exp(constants[0])), float(constants[1]))
     return run(law, a[-1] - 0.6 * da), law, dK_at
 
@@ -126,21 +126,21 @@ def _half(step: Step) -> float:
 
 
 def _of_lengths(a: Floats, N: Floats, dK_at: tuple[Floats, Floats], law: paris) -> Picture:
-    predicted = np.stack([_cycles(a, dK_at, np.array([np.log(law.C), law.m])), a], axis=1)
+    prediction = np.stack([_cycles(a, dK_at, np.array([np.log(law.C), law.m])), a], axis=1)
     tests = [Curve.of("" if k else "34 tests of the other half", np.stack([N[:, j], a], axis=1),
                       "other") for k, j in enumerate(range(0, N.shape[1], 2))]  # fmt: skip
     mean = Curve.of("their mean", np.stack([N[:, 0::2].mean(axis=1), a], axis=1), "measured")
-    curves = (*tests, mean, Curve.of("predicted", predicted, "predicted"))
+    curves = (*tests, mean, Curve.of("predicted", prediction, "predicted"))
     return Picture("Half length over cycles", "N", "a [mm]", curves)
 
 
-def _of_lives(measured: Floats, drawn: Floats) -> Picture:
-    share = (np.arange(len(measured)) + 0.5) / len(measured)
+def _of_lives(lives_: Floats, drawn_lives: Floats) -> Picture:
+    share = (np.arange(len(lives_)) + 0.5) / len(lives_)
     levels = np.linspace(0.002, 0.998, 250)
     return Picture(
         "Share of the tests that have ended", "N", "share",
-        (Curve.of("measured, other half", np.stack([np.sort(measured), share], axis=1), "measured"),
-         Curve.of("predicted", np.stack([np.quantile(drawn, levels), levels], axis=1),
+        (Curve.of("measured, other half", np.stack([np.sort(lives_), share], axis=1), "measured"),
+         Curve.of("predicted", np.stack([np.quantile(drawn_lives, levels), levels], axis=1),
                   "predicted")),
     )  # fmt: skip
 
@@ -167,9 +167,9 @@ def _zone(test: dict[str, Any], a: Floats, K: Floats, beta: float) -> float:
     zone = plastic_zone(1e3 * test["yield_stress"], beta)
     start = test["a_overload"]
     border = start + float(zone(test["P_overload"] * np.interp(start, a, K)))
-    fine = np.linspace(start, a[-1], 4001)
-    beyond = fine + zone(test["P_max"] * np.interp(fine, a, K)) >= border
-    return float(fine[np.argmax(beyond)] - start) if beyond.any() else float("nan")
+    fine_a = np.linspace(start, a[-1], 4001)
+    is_beyond = fine_a + zone(test["P_max"] * np.interp(fine_a, a, K)) >= border
+    return float(fine_a[np.argmax(is_beyond)] - start) if is_beyond.any() else float("nan")
 
 
 def _run_overload(experiment: Experiment, quick: bool) -> Outcome:

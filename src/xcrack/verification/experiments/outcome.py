@@ -181,10 +181,10 @@ def _picture(content: Mapping[str, Any]) -> Picture:
 def distances(points: Floats, path: Floats) -> Floats:
     """Distance of points (n, 2) from a polyline (k, 2): (n,)."""
     begin, leg = path[:-1], np.diff(path, axis=0)
-    away = points[:, None] - begin
+    offset = points[:, None] - begin
     length = np.maximum((leg**2).sum(axis=1), 1e-300)
-    share = np.clip((away * leg).sum(axis=2) / length, 0.0, 1.0)
-    return np.asarray(np.linalg.norm(away - share[..., None] * leg, axis=2).min(axis=1))
+    share = np.clip((offset * leg).sum(axis=2) / length, 0.0, 1.0)
+    return np.asarray(np.linalg.norm(offset - share[..., None] * leg, axis=2).min(axis=1))
 
 
 def rms(values: Floats) -> float:
@@ -193,10 +193,10 @@ def rms(values: Floats) -> float:
 
 
 def path_comparisons(
-    measured: Floats,
+    measured_path: Floats,
     path: Floats,
     *,
-    within: Sequence[float] = (inf, inf),
+    limits: Sequence[float] = (inf, inf),
     where: str = "",
     unit: str = "mm",
 ) -> list[Comparison]:
@@ -204,20 +204,20 @@ def path_comparisons(
 
     Parameters
     ----------
-    measured : (n, 2) array
+    measured_path : (n, 2) array
     path : (k, 2) array
-    within : (float, float)
+    limits : (float, float)
         Bounds of both.
     where : str
         Said behind the names.
     unit : str
     """
-    away = distances(measured, path)
+    deviation = distances(measured_path, path)
     names = ("distance of the path, rms", "distance of the path, largest")
-    values = (rms(away), float(away.max()))
+    values = (rms(deviation), float(deviation.max()))
     return [
-        Comparison(f"{name}{where}", value, unit=unit, most=most)
-        for name, value, most in zip(names, values, within, strict=True)
+        Comparison(f"{name}{where}", value, unit=unit, most=limit)
+        for name, value, limit in zip(names, values, limits, strict=True)
     ]
 
 

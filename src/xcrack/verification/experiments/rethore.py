@@ -64,8 +64,8 @@ def _mesh(experiment: Experiment, size: float) -> Mesh:
 def _supports(kind: str) -> list[Support]:
     """Platens that come nearer by 1."""
     if kind == "sliding":
-        corner, nearer = fix((0.0, 0.0), axis=1), (-1.0, None)
-        return [fix("left", axis=0), displacement("right", cast(Any, nearer)), corner]
+        corner, pull = fix((0.0, 0.0), axis=1), (-1.0, None)
+        return [fix("left", axis=0), displacement("right", cast(Any, pull)), corner]
     end = "_band" if kind == "bands" else ""
     return [fix(f"left{end}"), displacement(f"right{end}", (-1.0, 0.0))]
 
@@ -83,8 +83,8 @@ def plate_of(experiment: Experiment, mesh: Mesh, kind: str, contact: str) -> Pro
     """
     geometry, material = experiment.geometry, experiment.material
     center, tip = np.array(geometry["hole"]["center"]), np.array(geometry["tip"])
-    ahead = (tip - center) / np.linalg.norm(tip - center)
-    start = center + (geometry["hole"]["radius"] - 1.0) * ahead
+    direction = (tip - center) / np.linalg.norm(tip - center)
+    start = center + (geometry["hole"]["radius"] - 1.0) * direction
     steel = Isotropic(material["E"], material["nu"], "stress")
     crack = line_crack([start, tip])
     return Problem(mesh, steel, [crack], supports=_supports(kind), contact=contact)
@@ -92,13 +92,13 @@ def plate_of(experiment: Experiment, mesh: Mesh, kind: str, contact: str) -> Pro
 
 def _run(experiment: Experiment, quick: bool) -> Outcome:
     size, da = _COARSE if quick else _FINE
-    mesh, measured = _mesh(experiment, size), experiment.path
+    mesh, measured_path = _mesh(experiment, size), experiment.path
     comparisons: list[Comparison] = []
-    curves = [*outline(mesh), Curve.of("measured", measured, "measured")]
+    curves = [*outline(mesh), Curve.of("measured", measured_path, "measured")]
     force: list[Curve] = []
     for kind in ("bands", "sliding") if quick else _SUPPORTS:
         reach = _FADES if kind == "sides" else _END
-        compared = measured[measured[:, 0] >= reach]
+        compared = measured_path[measured_path[:, 0] >= reach]
         for contact in ("auto", "off"):
             history = grown(
                 plate_of(experiment, mesh, kind, contact), _LAW, Cycle(0.0, 1.0), da,
@@ -106,14 +106,14 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
             )  # fmt: skip
             path = history.cracks[0].points[1:]
             words = f"{_SUPPORTS[kind]}, contact {contact.replace('auto', 'on')}"
-            within = (_RMS if (kind, contact) == ("bands", "auto") else inf, inf)
-            comparisons += path_comparisons(compared, path, within=within, where=f": {words}")
+            limits = (_RMS if (kind, contact) == ("bands", "auto") else inf, inf)
+            comparisons += path_comparisons(compared, path, limits=limits, where=f": {words}")
             role: Role = "predicted" if (kind, contact) == ("bands", "auto") else "variant"
             curves.append(Curve.of(words, path, role))
             if (kind, contact) == ("bands", "auto"):
                 comparisons.append(_first_angle(experiment, history))
-                added, force = _forces(experiment, history)
-                comparisons += added
+                of_forces, force = _forces(experiment, history)
+                comparisons += of_forces
     return Outcome(
         experiment.name,
         (experiment.name,),
@@ -151,38 +151,44 @@ def _first_angle(experiment: Experiment, history: History) -> Comparison:
     path = history.cracks[0].points
     start = int(np.argmin(np.linalg.norm(path - tip, axis=1)))
     arc = arc_of(path[start:])
-    there = np.array([np.interp(2.53, arc, path[start:, k]) for k in range(2)]) - tip
-    angle = float(np.degrees(np.arctan2(there[1], there[0])))
-    measured = experiment.measured["direction"]
-    return Comparison("first direction", angle, measured, "difference", "degrees", -6.0, 6.0)
+    chord = np.array([np.interp(2.53, arc, path[start:, k]) for k in range(2)]) - tip
+    angle = float(np.degrees(np.arctan2(chord[1], chord[0])))
+    range_measured = experiment.measured["direction"]
+    return Comparison("first direction", angle, range_measured, "difference", "degrees", -6.0, 6.0)
 
 
 def _forces(experiment: Experiment, history: History) -> tuple[list[Comparison], list[Curve]]:
     """Force and displacement at which the crack goes on at K = K_c, from a scene that is linear."""
-    thickness, measured = experiment.geometry["thickness"], experiment.measured
+    thickness, measurements = experiment.geometry["thickness"], experiment.measured
     table = history.load_at(_K_C * ROOT_M)
     shift, force = table["displacement"], thickness * table["force"]
     stiffness = float(force[0] / shift[0])
-    low, high = measured["stiffness"]
+    low, high = measurements["stiffness"]
     comparisons = [
         Comparison("stiffness with the pre-crack", stiffness, (low + high) / 2, "ratio"),
         Comparison(
-            "force at which the crack begins", float(force[0]), measured["force_at_knee"], "ratio"
+            "force at which the crack begins",
+            float(force[0]),
+            measurements["force_at_knee"],
+            "ratio",
         ),
         Comparison(
-            "force at the end, K = 1.28 MPa√m", float(force[-1]), measured["force_at_end"], "ratio"
+            "force at the end, K = 1.28 MPa√m",
+            float(force[-1]),
+            measurements["force_at_end"],
+            "ratio",
         ),
         Comparison(
             "force at the end, K as it fell in the test",
-            float(force[-1]) * measured["K_end_over_first"],
-            measured["force_at_end"],
+            float(force[-1]) * measurements["K_end_over_first"],
+            measurements["force_at_end"],
             "ratio",
         ),
     ]
-    knee = measured["force_at_knee"] / ((low + high) / 2)
-    points = measured.get("force") or [
-        [0.0, 0.0], [knee, measured["force_at_knee"]],
-        [measured["displacement_at_end"], measured["force_at_end"]],
+    knee = measurements["force_at_knee"] / ((low + high) / 2)
+    points = measurements.get("force") or [
+        [0.0, 0.0], [knee, measurements["force_at_knee"]],
+        [measurements["displacement_at_end"], measurements["force_at_end"]],
     ]  # fmt: skip
     curve = np.array([[0.0, 0.0], *zip(shift, force, strict=True)])
     return comparisons, [

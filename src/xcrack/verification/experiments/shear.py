@@ -48,8 +48,8 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     comparisons, points, loads = [], [], []
     scale, nu = None, experiment.material["nu"]
     for angle in np.unique(tests[:, 0]):
-        same = tests[tests[:, 0] == angle]
-        length = float(same[:, 2].mean())
+        tests_at_angle = tests[tests[:, 0] == angle]
+        length = float(tests_at_angle[:, 2].mean())
         scene = _specimen(experiment, mesh, length, np.radians(angle))
         K = stress_intensity(solve(scene)).K[0]
         turn = float(abs(max_hoop_stress(np.array([[K], [K]]), nu)[0][0]))
@@ -57,26 +57,26 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
         turn = float(np.degrees(turn))
         bound = _WITHIN if angle <= 45 else np.inf
         comparisons.append(
-            Comparison(f"angle at {angle:g} degrees", turn, float(same[:, 4].mean()),
+            Comparison(f"angle at {angle:g} degrees", turn, float(tests_at_angle[:, 4].mean()),
                        "difference", "degrees", -bound, bound)
         )  # fmt: skip
         points.append((angle, turn))
         # Loads at fracture, if the toughness is what those at 15 degrees say.
-        stress = 1000.0 * same[:, 3] / same[:, 1]
+        stress = 1000.0 * tests_at_angle[:, 3] / tests_at_angle[:, 1]
         scale = K_eq * float(stress.mean()) if scale is None else scale
-        predicted = scale / K_eq
-        loads.append((angle, predicted * 10.0 / 1000.0))
+        load = scale / K_eq
+        loads.append((angle, load * 10.0 / 1000.0))
         if angle > tests[0, 0]:
             comparisons.append(
-                Comparison(f"load at fracture at {angle:g} degrees", predicted / 1000.0,
+                Comparison(f"load at fracture at {angle:g} degrees", load / 1000.0,
                            float(stress.mean()) / 1000.0, "ratio", "kN/mm")
             )  # fmt: skip
-    measured = tests[:, [0, 4]]
+    measured_loads = tests[:, [0, 4]]
     at_ten = np.stack([tests[:, 0], tests[:, 3] * 10.0 / tests[:, 1]], axis=1)
     toughness = f"{scale / ROOT_M:.0f}" if scale else ""
     pictures = (
         Picture("Angle of the turn", "loading angle [degrees]", "turn [degrees]",
-                (Curve.of("measured", measured, "measured"),
+                (Curve.of("measured", measured_loads, "measured"),
                  Curve.of("predicted, largest hoop stress", points, "predicted"))),
         Picture("Load at fracture, 10 mm thick", "loading angle [degrees]", "load [kN]",
                 (Curve.of("measured", at_ten, "measured"),

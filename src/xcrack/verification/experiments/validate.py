@@ -191,10 +191,10 @@ def _key(experiment: Experiment, quick: bool) -> str:
 
 def run_trial(trial: Trial, experiment: Experiment, *, quick: bool) -> Outcome:
     """Predict one test; what it lacks, and what goes wrong, is in the outcome."""
-    missing = _missing(trial.needs)
-    empty = Outcome(trial.name, (trial.name,), quick=quick)
-    if missing:
-        return replace(empty, skipped=missing, seconds=0.0)
+    missing_package = _missing_package(trial.needs)
+    no_outcome = Outcome(trial.name, (trial.name,), quick=quick)
+    if missing_package:
+        return replace(no_outcome, skipped=missing_package, seconds=0.0)
     messages: list[str] = []
     begin = time.process_time()
     try:
@@ -202,13 +202,13 @@ def run_trial(trial: Trial, experiment: Experiment, *, quick: bool) -> Outcome:
             outcome = trial.run(experiment, quick)
     except Exception as problem:  # the others are run all the same
         text = "".join(traceback.format_exception_only(problem)).strip()
-        return replace(empty, error=text, seconds=time.process_time() - begin)
+        return replace(no_outcome, error=text, seconds=time.process_time() - begin)
     seconds = time.process_time() - begin
     warnings = tuple(dict.fromkeys(messages))
     return replace(outcome, quick=quick, seconds=seconds, warnings=warnings)
 
 
-def _missing(name: str) -> str:
+def _missing_package(name: str) -> str:
     """Why a package that a trial needs cannot be used; empty where it can."""
     if not name:
         return ""

@@ -111,9 +111,9 @@ def cycles_at(history: History, law: Law, experiment: Experiment, x: Floats) -> 
         """Over that of the run, at crack sizes."""
         return np.asarray(start * np.exp(load["theta"] * (np.interp(a, sizes, place) - first)))
 
-    N, reached = history.rerate(law, load=force_factor).cycles, np.maximum.accumulate(place)
-    N = N - np.interp(first, reached, N)
-    return np.where(x <= reached[-1], np.interp(x, reached, N), np.nan)
+    N, reached_place = history.rerate(law, load=force_factor).cycles, np.maximum.accumulate(place)
+    N = N - np.interp(first, reached_place, N)
+    return np.where(x <= reached_place[-1], np.interp(x, reached_place, N), np.nan)
 
 
 def _run(experiment: Experiment, quick: bool) -> Outcome:
@@ -126,17 +126,17 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     problem = specimen(experiment, size)
     history = grown(problem, law, cycle, da)
     path = history.cracks[0].points
-    measured, counts = experiment.path, np.array(experiment.measured["aN"])
-    comparisons = _of_paths(letter, measured, path)
+    measured_path, counts = experiment.path, np.array(experiment.measured["aN"])
+    comparisons = _of_paths(letter, measured_path, path)
     N = cycles_at(history, law, experiment, counts[:, 2])
-    for (count, _, x, _), predicted in zip(counts[1:], N[1:], strict=True):
-        if np.isfinite(predicted):
+    for (count, _, x, _), predicted_N in zip(counts[1:], N[1:], strict=True):
+        if np.isfinite(predicted_N):
             comparisons.append(
-                Comparison(f"cycles to x = {x:.2f} mm", float(predicted), count, "ratio")
+                Comparison(f"cycles to x = {x:.2f} mm", float(predicted_N), count, "ratio")
             )
     last = comparisons.pop()
     comparisons.append(replace(last, least=1 / _LIFE, most=_LIFE))
-    curves = [*outline(problem.mesh), Curve.of("measured", measured, "measured")]
+    curves = [*outline(problem.mesh), Curve.of("measured", measured_path, "measured")]
     if not quick:
         bar = distances(
             path[1:],
@@ -157,23 +157,23 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
                 .points
             )
             comparisons += path_comparisons(
-                measured[measured[:, 0] <= _REACH.get(letter, np.inf)],
+                measured_path[measured_path[:, 0] <= _REACH.get(letter, np.inf)],
                 other,
                 where=f", pins over {degrees:g} degrees",
             )
             curves.append(Curve.of(f"predicted, pins over {degrees:g}°", other[1:], "variant"))
-    comparisons += by_others(experiment, measured)
+    comparisons += by_others(experiment, measured_path)
     if letter in _REACH:
-        near = measured[measured[:, 0] <= _REACH[letter]]
-        comparisons += by_others(experiment, near, f" up to x = {_REACH[letter]:g}")
+        first_part = measured_path[measured_path[:, 0] <= _REACH[letter]]
+        comparisons += by_others(experiment, first_part, f" up to x = {_REACH[letter]:g}")
     curves.append(Curve.of("predicted", path[1:], "predicted"))
     curves += [Curve.of(o["program"], o["path"], "other") for o in experiment.others if "path" in o]
     grid = np.linspace(counts[0, 2], counts[-1, 2], 200)
-    along = cycles_at(history, law, experiment, grid)
-    reached = np.isfinite(along)
+    N_at_grid = cycles_at(history, law, experiment, grid)
+    is_reached = np.isfinite(N_at_grid)
     life = [
         Curve.of("measured", counts[:, [0, 2]], "measured"),
-        Curve.of("predicted", np.stack([along, grid], axis=1)[reached], "predicted"),
+        Curve.of("predicted", np.stack([N_at_grid, grid], axis=1)[is_reached], "predicted"),
     ]
     pictures = (
         Picture("Path", "x [mm]", "y [mm]", tuple(curves), is_to_scale=True),
@@ -184,16 +184,16 @@ def _run(experiment: Experiment, quick: bool) -> Outcome:
     )
 
 
-def _of_paths(letter: str, measured: Floats, path: Floats) -> list[Comparison]:
+def _of_paths(letter: str, measured_path: Floats, path: Floats) -> list[Comparison]:
     """Distances up to where the path is asserted, and of all of it."""
     reach = _REACH.get(letter)
     if reach is None:
-        return path_comparisons(measured, path, within=(_RMS[letter], inf))
-    near = path_comparisons(
-        measured[measured[:, 0] <= reach], path, within=(_RMS[letter], inf),
+        return path_comparisons(measured_path, path, limits=(_RMS[letter], inf))
+    comparisons = path_comparisons(
+        measured_path[measured_path[:, 0] <= reach], path, limits=(_RMS[letter], inf),
         where=f" up to x = {reach:g}",
     )  # fmt: skip
-    return [*near, *path_comparisons(measured, path)]
+    return [*comparisons, *path_comparisons(measured_path, path)]
 
 
 TRIALS = tuple(Trial(f"wagner_2018_{letter}", _run) for letter in "abc")

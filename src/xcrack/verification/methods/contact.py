@@ -58,15 +58,15 @@ def stress_matrix(
             _, G = space.tabulate(batch, row, lips.bary[number, s], side[number])
             functions = batch.functions[row]
             normal = lips.normal[number]
-            across = np.einsum("ijkl,qi,qj->qkl", stiffness, normal, normal)
-            stress = np.einsum("qkl,qnl->qnk", across, G)
+            traction_matrix = np.einsum("ijkl,qi,qj->qkl", stiffness, normal, normal)
+            stress = np.einsum("qkl,qnl->qnk", traction_matrix, G)
             stress *= share[number, s, None, None]
-            acts = functions >= 0
-            point = np.broadcast_to(number[:, None], functions.shape)[acts]
+            is_active = functions >= 0
+            point = np.broadcast_to(number[:, None], functions.shape)[is_active]
             for i in range(d):
                 rows.append(point)
-                columns.append(functions[acts] * d + i)
-                values.append(stress[acts, i])
+                columns.append(functions[is_active] * d + i)
+                values.append(stress[is_active, i])
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     matrix = sp.csr_matrix(triplets, shape=(len(lips), space.n_dof))
     matrix.sum_duplicates()
@@ -87,9 +87,9 @@ def lip_shares(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
     volume = np.zeros((len(mesh.cells), 2))
     place = (cut.sub_side > 0).astype(np.int64)
     np.add.at(volume, (cut.sub_to_cell, place), cut.sub_fraction)
-    whole = lips.cell[:, 0] != lips.cell[:, 1]
+    is_whole = lips.cell[:, 0] != lips.cell[:, 1]
     part = np.stack([volume[lips.cell[:, 0], 0], volume[lips.cell[:, 1], 1]], axis=1)
-    part[whole] = 1.0
+    part[is_whole] = 1.0
     part *= mesh.volume[lips.cell]
     return np.asarray(part / part.sum(axis=1, keepdims=True))
 
@@ -138,14 +138,14 @@ def tip_distance(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
     nearest = np.full(len(lips), np.inf)
     cell = space.mesh.cells[lips.cell[:, 1]]
     for psi in space.cuts[c].level_set.psi:
-        along = np.abs(np.einsum("qb,qb->q", lips.bary[:, 1], psi[cell]))
-        nearest = np.fmin(nearest, along)
+        distance = np.abs(np.einsum("qb,qb->q", lips.bary[:, 1], psi[cell]))
+        nearest = np.fmin(nearest, distance)
     total = np.bincount(lips.segment, lips.weight * nearest)
     size = np.bincount(lips.segment, lips.weight)
     return np.asarray((total / np.maximum(size, 1e-300))[lips.segment])
 
 
-def steady_stress(material: Material, lips: LipPoints, c: int, acting: LoadState) -> Floats:
+def steady_stress(material: Material, lips: LipPoints, c: int, load_state: LoadState) -> Floats:
     """Normal stress that loads add to that of the strain `(q,)`: initial stress, given pressure.
 
     Parameters
@@ -154,10 +154,10 @@ def steady_stress(material: Material, lips: LipPoints, c: int, acting: LoadState
     lips : LipPoints
     c : int
         Crack.
-    acting : LoadState
+    load_state : LoadState
     """
     total = np.zeros(len(lips))
-    for load, factor in acting:
+    for load, factor in load_state:
         if "initial_stress" in load.acts:
             sigma = factor * load.initial_stress(lips.x, material)
             total += np.einsum("qi,qij,qj->q", lips.normal, sigma, lips.normal)
@@ -209,7 +209,7 @@ class Springs(Declared, ContactMethod):
         engine: DirectSystem,
         chosen: Sequence[Multipliers],
         f: Floats,
-        known: Floats,
+        u_known: Floats,
         start: Sequence[Bools | None],
         closed: bool,
         acting: Sequence[LoadState],
@@ -249,8 +249,10 @@ class Springs(Declared, ContactMethod):
         for k in range(f.shape[1]):
             first = start[k]
             guess = np.full(len(rows.eps), closed) if first is None else first
-            given = partial(face_tractions, problem, model, chosen, acting[k])
-            u, pressure, sets = self.solution(system, rows, f[:, k], known[:, k], guess, given)
+            tractions = partial(face_tractions, problem, model, chosen, acting[k])
+            u, pressure, sets = self.solution(
+                system, rows, f[:, k], u_known[:, k], guess, tractions
+            )
             states.append(StateContact(pressure, rows.jump @ u, pressure > 0, sets, u))
         return states
 
@@ -260,11 +262,11 @@ class Springs(Declared, ContactMethod):
         return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.basis_matrix)
 
     def solution(
-        self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
-        given: Callable[[], Floats],
+        self, system: "ClosedSystem", rows: "Rows", f: Floats, u_known: Floats, start: Bools,
+        tractions: Callable[[], Floats],
     ) -> tuple[Floats, Floats, int]:  # fmt: skip
         """Displacements, pressures, and the number of sets of one state."""
-        state = _newton(system, f, known, np.zeros(len(rows.eps)), start)
+        state = _newton(system, f, u_known, np.zeros(len(rows.eps)), start)
         return state.u, np.maximum(-state.residual * rows.eps, 0.0), state.sets
 
 
@@ -323,18 +325,18 @@ class augmented_lagrangian(Springs):  # noqa: N801
         return ClosedSystem(engine, engine.matrix, rows.jump, c, engine.basis_matrix)
 
     def solution(
-        self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
-        given: Callable[[], Floats],
+        self, system: "ClosedSystem", rows: "Rows", f: Floats, u_known: Floats, start: Bools,
+        tractions: Callable[[], Floats],
     ) -> tuple[Floats, Floats, int]:  # fmt: skip
         """Updates of the multipliers (Uzawa) until they stay."""
         eps, measure = rows.eps, rows.measure
-        lam, sets, active = np.zeros(len(eps)), 0, start
+        lam, sets, is_active = np.zeros(len(eps)), 0, start
         for _ in range(_MAX_UPDATES):
-            state = _newton(system, f, known, -lam * measure / eps, active)
+            state = _newton(system, f, u_known, -lam * measure / eps, is_active)
             sets += state.sets
-            new = np.maximum(-state.residual * eps / measure, 0.0)
-            change = float(np.abs(new - lam).max(initial=0.0))
-            lam, active = new, state.active
+            new_lam = np.maximum(-state.residual * eps / measure, 0.0)
+            change = float(np.abs(new_lam - lam).max(initial=0.0))
+            lam, is_active = new_lam, state.active
             if change <= _TOLERANCE * float(np.abs(lam).max(initial=0.0)):
                 return state.u, lam, sets
         raise ConvergenceError(
@@ -378,29 +380,29 @@ class nitsche(Springs):  # noqa: N801
         R = sp.csr_matrix(rows.stress + sp.diags(rows.eps) @ rows.jump)
         stress = sp.csr_matrix(rows.stress @ engine.basis)
         K = sp.csr_matrix(engine.matrix - rows.stress.T @ sp.diags(c) @ rows.stress)
-        reduced = sp.csc_matrix(engine.basis_matrix - stress.T @ sp.diags(c) @ stress)
-        return ClosedSystem(engine, K, R, c, reduced)
+        reduced_matrix = sp.csc_matrix(engine.basis_matrix - stress.T @ sp.diags(c) @ stress)
+        return ClosedSystem(engine, K, R, c, reduced_matrix)
 
     def solution(
-        self, system: "ClosedSystem", rows: "Rows", f: Floats, known: Floats, start: Bools,
-        given: Callable[[], Floats],
+        self, system: "ClosedSystem", rows: "Rows", f: Floats, u_known: Floats, start: Bools,
+        tractions: Callable[[], Floats],
     ) -> tuple[Floats, Floats, int]:  # fmt: skip
         """The residual holds stresses: pressures as they are."""
-        r = given()
+        r = tractions()
         load = f + rows.stress.T @ (rows.measure / rows.eps * r)
-        state = _newton(system, load, known, r, start)
+        state = _newton(system, load, u_known, r, start)
         return state.u, np.maximum(-state.residual, 0.0), state.sets
 
 
 def face_tractions(
-    problem: Problem, model: System, chosen: Sequence[Multipliers], acting: LoadState
+    problem: Problem, model: System, chosen: Sequence[Multipliers], load_state: LoadState
 ) -> Floats:
     """Normal stress that loads add to that of the strain, at the points of all cracks `(q,)`."""
     parts = []
     for m in chosen:
         lips = model.lips[m.crack]
-        given = steady_stress(problem.elasticity.material, lips, m.crack, acting)
-        parts.append(averaging(model.space, lips) @ given if given.any() else given)
+        stress = steady_stress(problem.elasticity.material, lips, m.crack, load_state)
+        parts.append(averaging(model.space, lips) @ stress if stress.any() else stress)
     return np.concatenate(parts)
 
 
@@ -442,16 +444,16 @@ class ClosedSystem:
     def __post_init__(self) -> None:
         self.reduced_rows = sp.csr_matrix(self.rows @ self.engine.basis)
 
-    def closed(self, active: Bools) -> sp.csc_matrix:
+    def closed(self, is_active: Bools) -> sp.csc_matrix:
         """The matrix with the rows of a set."""
-        R = self.reduced_rows[active]
-        return sp.csc_matrix(self.reduced + R.T @ sp.diags(self.c[active]) @ R)
+        R = self.reduced_rows[is_active]
+        return sp.csc_matrix(self.reduced + R.T @ sp.diags(self.c[is_active]) @ R)
 
-    def solver(self, active: Bools) -> Solve:
+    def solver(self, is_active: Bools) -> Solve:
         """Solves with the rows of a set; kept while the set stays."""
-        key = active.tobytes()
+        key = is_active.tobytes()
         if self.last is None or self.last[0] != key:
-            self.last = key, superlu(self.closed(active))
+            self.last = key, superlu(self.closed(is_active))
             self.engine.count.factorisations += 1
         return self.last[1]
 
@@ -464,29 +466,29 @@ class _State:
     sets: int
 
 
-def _newton(system: ClosedSystem, f: Floats, known: Floats, r: Floats, start: Bools) -> _State:
+def _newton(system: ClosedSystem, f: Floats, u_known: Floats, r: Floats, start: Bools) -> _State:
     """Sets of closed rows until one stays; where one comes back, steps are cut by a line search."""
     K, R, c, basis = system.stiffness, system.rows, system.c, system.engine.basis
-    active, u = np.array(start, dtype=bool), None
+    is_active, u = np.array(start, dtype=bool), None
     visited_sets: set[bytes] = set()
     for sets in range(1, _MAX_SETS + 1):
-        part = R[active]
-        loads = f - K @ known - part.T @ (c[active] * (r[active] + part @ known))
-        new = known + basis @ system.solver(active)(basis.T @ loads)
+        part = R[is_active]
+        loads = f - K @ u_known - part.T @ (c[is_active] * (r[is_active] + part @ u_known))
+        new_u = u_known + basis @ system.solver(is_active)(basis.T @ loads)
         system.engine.count.solves += 1
-        if not np.isfinite(new).all():
+        if not np.isfinite(new_u).all():
             break
-        gap = np.asarray(R @ new + r)
+        gap = np.asarray(R @ new_u + r)
         # Values at round-off of zero (crack faces that only touch) must not make the set flicker.
         floor = 1e-13 * float(np.abs(gap).max(initial=0.0))
-        if ((gap < -floor) == active).all():
-            return _State(new, gap, active, sets)
-        if active.tobytes() in visited_sets and u is not None:
-            t = _step(system, f, r, u, new - u)
-            new = u + t * (new - u)
-            gap = np.asarray(R @ new + r)
-        visited_sets.add(active.tobytes())
-        u, active = new, gap < -floor
+        if ((gap < -floor) == is_active).all():
+            return _State(new_u, gap, is_active, sets)
+        if is_active.tobytes() in visited_sets and u is not None:
+            t = _step(system, f, r, u, new_u - u)
+            new_u = u + t * (new_u - u)
+            gap = np.asarray(R @ new_u + r)
+        visited_sets.add(is_active.tobytes())
+        u, is_active = new_u, gap < -floor
     raise ConvergenceError(
         f"contact: after {sets} sets of {len(c)} places the set of closed ones still changes. Give "
         "another factor of the contact method: less for a penalty, more for Nitsche's method; or "

@@ -64,7 +64,7 @@ def inf_sup(
         A, B = _h1(space), _scalar_rows(space, model, crack, chosen)
         basis = sp.identity(space.n_functions, format="csr")
     else:
-        fixed = np.zeros(space.n_dof, dtype=bool)
+        is_fixed = np.zeros(space.n_dof, dtype=bool)
         A = model.stiffness / problem.elasticity.largest_modulus
         # A small mass makes the rigid motions regular without a support.
         A = A + 1e-8 * sp.diags(A.diagonal())
@@ -72,7 +72,7 @@ def inf_sup(
         if has_friction(problem, crack):
             B = sp.csr_matrix(sp.vstack([B, *tangential_rows(space, chosen, lips)]))
         basis = scaled_basis(
-            space, sp.csr_matrix(A), fixed, problem.numerics, problem.elasticity.material
+            space, sp.csr_matrix(A), is_fixed, problem.numerics, problem.elasticity.material
         )
     L, d = space.mesh.extent, space.dim
     h = leg_sizes(space.mesh, lips.cell).mean(axis=1) / L
@@ -84,14 +84,17 @@ def inf_sup(
 
 
 def _schur(A: sp.csr_matrix, B: sp.csr_matrix, basis: sp.csr_matrix, scale: float) -> Floats:
-    reduced = sp.csc_matrix(basis.T @ (A / scale) @ basis)
-    diagonal = reduced.diagonal()
-    alive = np.nonzero(diagonal > 0)[0]
-    D = sp.diags(1 / np.sqrt(diagonal[alive]))
-    scaled = sp.csc_matrix(D @ reduced[alive][:, alive] @ D)
-    rows = sp.csr_matrix((B @ basis)[:, alive] @ D)
+    reduced_matrix = sp.csc_matrix(basis.T @ (A / scale) @ basis)
+    diagonal = reduced_matrix.diagonal()
+    has_energy = np.nonzero(diagonal > 0)[0]
+    D = sp.diags(1 / np.sqrt(diagonal[has_energy]))
+    scaled_matrix = sp.csc_matrix(D @ reduced_matrix[has_energy][:, has_energy] @ D)
+    rows = sp.csr_matrix((B @ basis)[:, has_energy] @ D)
     factor = sla.splu(
-        scaled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        scaled_matrix,
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
     )
     return np.asarray(rows @ factor.solve(rows.T.toarray()))
 
@@ -99,8 +102,8 @@ def _schur(A: sp.csr_matrix, B: sp.csr_matrix, basis: sp.csr_matrix, scale: floa
 def _smallest(schur: Floats, gram: Floats) -> float:
     """Smallest generalised eigenvalue; multipliers without a trace of their own give 0."""
     w, V = np.linalg.eigh(gram)
-    good = w > 1e-13 * w.max()
-    if not good.all():
+    is_positive = w > 1e-13 * w.max()
+    if not is_positive.all():
         return 0.0
     T = V / np.sqrt(w)
     return float(scipy.linalg.eigvalsh(T.T @ ((schur + schur.T) / 2) @ T)[0])
@@ -116,8 +119,10 @@ def _h1(space: FunctionSpace) -> sp.csr_matrix:
         N, G = space.tabulate(batch, row, points.bary[number], points.side[number])
         w = points.weight[number]
         extent = space.mesh.extent
-        flat = np.einsum("q,qad,qbd->qab", w, G, G) + np.einsum("q,qa,qb->qab", w, N, N) / extent**2
-        block = np.add.reduceat(flat, first[:-1], axis=0)
+        integrand = (
+            np.einsum("q,qad,qbd->qab", w, G, G) + np.einsum("q,qa,qb->qab", w, N, N) / extent**2
+        )
+        block = np.add.reduceat(integrand, first[:-1], axis=0)
         n = batch.functions.shape[1]
         r = np.repeat(batch.functions, n, axis=1).ravel()
         c = np.tile(batch.functions, (1, n)).ravel()
@@ -133,10 +138,10 @@ def _scalar_rows(space: FunctionSpace, model: System, c: int, chosen: Multiplier
     lips = model.lips[c]
     rows, columns, values = [], [], []
     for functions, number, N in jump_values(space, c, lips):
-        acts = functions >= 0
-        rows.append(np.broadcast_to(number[:, None], functions.shape)[acts])
-        columns.append(functions[acts])
-        values.append(N[acts])
+        is_active = functions >= 0
+        rows.append(np.broadcast_to(number[:, None], functions.shape)[is_active])
+        columns.append(functions[is_active])
+        values.append(N[is_active])
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     jump = sp.csr_matrix(triplets, shape=(len(lips), space.n_functions))
     return sp.csr_matrix(chosen.values.T @ sp.diags(lips.weight) @ jump)

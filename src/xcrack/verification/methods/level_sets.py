@@ -82,13 +82,13 @@ def nodal_update(
     Nodal
     """
     c, s = np.cos(angle), np.sin(angle)
-    ahead, normal = c * frame[0] + s * frame[1], c * frame[1] - s * frame[0]
-    local = x - (tip + da * ahead)
-    within = np.einsum("nd,nd->n", local, local) <= reach**2
+    direction, normal = c * frame[0] + s * frame[1], c * frame[1] - s * frame[0]
+    local = x - (tip + da * direction)
+    is_within = np.einsum("nd,nd->n", local, local) <= reach**2
     psi = np.array(levels.psi)
-    free = within & (psi[k] > 0)
-    phi = np.where(free, local @ normal, levels.phi)
-    psi[k] = np.where(within, local @ ahead, psi[k])
+    is_free = is_within & (psi[k] > 0)
+    phi = np.where(is_free, local @ normal, levels.phi)
+    psi[k] = np.where(is_within, local @ direction, psi[k])
     return Nodal(lock(phi), lock(psi))
 
 
@@ -121,18 +121,18 @@ def nodal_level_set(
     low, high = (first if 0 in tips else 0), (first + 1 if last in tips else last)
     ends = tuple(0 if tip == 0 else high - low for tip in tips)
     start = Crack(crack.points[low : high + 1], crack.faces[: high - low], ends)
-    initial = line_levels(mesh, start)
-    levels, grown = Nodal(initial.phi, initial.psi), start
+    first_levels = line_levels(mesh, start)
+    levels, grown_crack = Nodal(first_levels.phi, first_levels.psi), start
     for k, tip in enumerate(tips):
         pieces = crack.points[low::-1] if tip == 0 else crack.points[high:]
-        for new in pieces[1:]:
-            x, frame = tip_frames(grown)
-            along, across = frame[k] @ (new - x[k])
+        for new_point in pieces[1:]:
+            x, frame = tip_frames(grown_crack)
+            along_tip, across_tip = frame[k] @ (new_point - x[k])
             angle, da = np.zeros(len(tips)), np.zeros(len(tips))
-            angle[k], da[k] = np.arctan2(across, along), np.hypot(along, across)
+            angle[k], da[k] = np.arctan2(across_tip, along_tip), np.hypot(along_tip, across_tip)
             levels = nodal_update(mesh.points, levels, k, x[k], frame[k], angle[k], da[k], reach)
-            grown = advance(grown, angle, da)
+            grown_crack = advance(grown_crack, angle, da)
     phi, psi = np.array(levels.phi), np.array(levels.psi)
     # Away from the tip phi is no distance: its sign, and that of psi, are all there is.
-    near = np.ones(len(mesh.edges), dtype=bool)
-    return tied_to_tips(mesh, crack, phi, psi, np.array(initial.mouth), near)
+    is_near = np.ones(len(mesh.edges), dtype=bool)
+    return tied_to_tips(mesh, crack, phi, psi, np.array(first_levels.mouth), is_near)

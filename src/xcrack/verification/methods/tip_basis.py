@@ -33,14 +33,14 @@ class modal_basis(TipBasis):  # noqa: N801 - it is used as a function
         return dim
 
     def columns(
-        self, space: FunctionSpace, material: Material | None, free: Bools
+        self, space: FunctionSpace, material: Material | None, is_free: Bools
     ) -> tuple[sp.csr_matrix, Bools]:
         """See `mode_columns`."""
-        return mode_columns(space, material, free)
+        return mode_columns(space, material, is_free)
 
 
 def mode_columns(
-    space: FunctionSpace, material: Material | None, free: Bools
+    space: FunctionSpace, material: Material | None, is_free: Bools
 ) -> tuple[sp.csr_matrix, Bools]:
     """Basis in which each enriched point has one unknown a mode, and which columns are in use.
 
@@ -55,13 +55,13 @@ def mode_columns(
         With four functions a tip.
     material : Material or None
         The angular part of the modes depends on Poisson's ratio.
-    free : (n_dof,) array of bool
+    is_free : (n_dof,) array of bool
         Unknowns that supports leave.
 
     Returns
     -------
     columns : sparse matrix (n_dof, n_dof)
-    free : (n_dof,) array of bool
+    is_free : (n_dof,) array of bool
         Columns that stand for an unknown.
     """
     if material is None:
@@ -69,30 +69,30 @@ def mode_columns(
     d = space.dim
     modes = local_modes(material.at_tip().kolosov, d)
     rows, columns, values = [], [], []
-    plain = np.ones(space.n_dof, dtype=bool)
-    used = np.array(free)
+    is_plain = np.ones(space.n_dof, dtype=bool)
+    is_used = np.array(is_free)
     for tip in space.tips:
         points = np.nonzero(tip.point_to_function >= 0)[0]
         functions = tip.point_to_function[points][:, None] + np.arange(tip.functions)
-        unknown = functions[:, :, None] * d + np.arange(d)
-        plain[unknown] = used[unknown] = False
-        whole = free[unknown].all(axis=(1, 2))
-        points, unknown = points[whole], unknown[whole]
+        unknowns = functions[:, :, None] * d + np.arange(d)
+        is_plain[unknowns] = is_used[unknowns] = False
+        is_whole = is_free[unknowns].all(axis=(1, 2))
+        points, unknowns = points[is_whole], unknowns[is_whole]
         # (points, modes, functions, components)
         share = np.einsum("mal,pac->pmlc", modes, _frames(space, tip, points))
-        column = unknown[:, 0, :]
-        used[column] = True
-        rows.append(np.broadcast_to(unknown[:, None], share.shape).ravel())
+        column = unknowns[:, 0, :]
+        is_used[column] = True
+        rows.append(np.broadcast_to(unknowns[:, None], share.shape).ravel())
         columns.append(np.broadcast_to(column[:, :, None, None], share.shape).ravel())
         values.append(share.ravel())
-    same = np.nonzero(plain)[0]
-    rows.append(same)
-    columns.append(same)
-    values.append(np.ones(len(same)))
+    unchanged_columns = np.nonzero(is_plain)[0]
+    rows.append(unchanged_columns)
+    columns.append(unchanged_columns)
+    values.append(np.ones(len(unchanged_columns)))
     triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
     matrix = sp.csr_matrix(triplets, shape=(space.n_dof, space.n_dof))
     matrix.eliminate_zeros()
-    return matrix, lock(used)
+    return matrix, lock(is_used)
 
 
 def local_modes(kolosov: float, dim: int) -> Floats:

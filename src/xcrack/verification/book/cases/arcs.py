@@ -34,15 +34,15 @@ def _open(level: int, order: int, degrees: float, stress: tuple[float, float]) -
     sif = stress_intensity(solve(problem))
     reference = np.array([arc.K_lower, arc.K_upper]) * [[1, -1], [1, 1]]
     scale = float(np.abs(reference).max())
-    within = {1: 1e-2, 2: 5e-3}[order]
+    tolerance = {1: 1e-2, 2: 5e-3}[order]
     return [
-        Value(f"K_{'I' * (m + 1)} at tip {k}", sif.K[k, m], reference[k, m], within, scale)
+        Value(f"K_{'I' * (m + 1)} at tip {k}", sif.K[k, m], reference[k, m], tolerance, scale)
         for k in (0, 1)
         for m in (0, 1)
     ]
 
 
-def _closed(level: int, order: int) -> list[Value]:
+def _closed_arc(level: int, order: int) -> list[Value]:
     field = turned(lambda x, y: arc_manufactured(x, y, 1.0, E, NU, p0=1.0, p2=0.5), _CENTRE)
     n = 10 * 2**level
     theta = np.linspace(-0.45, 0.6, max(n // 2, 8) + 1)
@@ -76,7 +76,7 @@ CASES = (
     ),
     *(
         Case(f"closed-arc-{order}", "pressure", "smooth field without shear on a circle", "exact",
-             2, order, True, partial(_closed, order=order), 3)
+             2, order, True, partial(_closed_arc, order=order), 3)
         for order in (1, 2)
     ),
 )  # fmt: skip

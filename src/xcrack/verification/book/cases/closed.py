@@ -36,11 +36,11 @@ def _ring(level: int, order: int) -> list[Value]:
     field = turned(
         lambda x, y: plates.lame_cylinder(x, y, _INNER, _OUTER, 0.0, 1.0, E, NU), (0.0, 0.0)
     )
-    ahead = rows(0.4)[0]
+    direction = rows(0.4)[0]
     problem = Problem(
         annulus(_INNER, _OUTER, n, 5 * n),
         Isotropic(E, NU, "strain"),
-        [line_crack([0.4 * ahead, 1.1 * ahead])],
+        [line_crack([0.4 * direction, 1.1 * direction])],
         loads=tractions(field, ("inner", "outer")),
         order=order,
         contact="on",
@@ -85,7 +85,7 @@ def _half(level: int, order: int, s_m: float) -> list[Value]:
     ]  # fmt: skip
 
 
-def _sliding(level: int, order: int) -> list[Value]:
+def _sliding_crack(level: int, order: int) -> list[Value]:
     """Compression and shear of equal size; friction is none."""
     n = 41 * 2**level
     problem, _ = centre_crack(
@@ -122,7 +122,7 @@ CASES = (
     ),
     *(
         Case(f"sliding-{order}", "sliding", "closed crack in shear, exact.closed",
-             "exact", 2, order, True, partial(_sliding, order=order), 2)
+             "exact", 2, order, True, partial(_sliding_crack, order=order), 2)
         for order in (1, 2)
     ),
 )  # fmt: skip

@@ -22,11 +22,16 @@ _SOURCE = "fit to finite elements, good to 5 % (Newman and Raju, 1981), one crac
 
 def _plate(h: float) -> Mesh:
     """Round plate around the hole, its cells of size h where the crack is."""
-    fine = _R + h * np.arange(round(1.6 / h) + 1)
+    fine_radii = _R + h * np.arange(round(1.6 / h) + 1)
     step = h * 1.35 ** np.arange(1, 40)
-    far = fine[-1] + np.cumsum(step)
-    far = far[: int(np.argmax(far >= _OUTER)) + 1]
-    radii = np.concatenate([fine, np.interp(far, [fine[-1], far[-1]], [fine[-1], _OUTER])])
+    far_radii = fine_radii[-1] + np.cumsum(step)
+    far_radii = far_radii[: int(np.argmax(far_radii >= _OUTER)) + 1]
+    radii = np.concatenate(
+        [
+            fine_radii,
+            np.interp(far_radii, [fine_radii[-1], far_radii[-1]], [fine_radii[-1], _OUTER]),
+        ]
+    )
     angle = [0.0]
     width = h / _R
     while angle[-1] < np.pi:
@@ -37,21 +42,21 @@ def _plate(h: float) -> Mesh:
     theta = np.sort(np.concatenate([half, -half[1:-1]])) + 0.3 * h / _R
     n = len(theta)
     unit = np.stack([np.cos(theta), np.sin(theta)], axis=1)
-    flat = (radii[:, None, None] * unit).reshape(-1, 2)
+    plane_points = (radii[:, None, None] * unit).reshape(-1, 2)
     i, k = np.arange(n), np.arange(len(radii) - 1)[:, None] * n
     a, b, c, d = (x.ravel() for x in (k + i, k + (i + 1) % n, k + n + i, k + n + (i + 1) % n))
     triangles = np.sort(np.concatenate([np.stack([a, c, b], 1), np.stack([b, c, d], 1)]), axis=1)
-    layers, m = round(_T / h), len(flat)
+    layers, m = round(_T / h), len(plane_points)
     z = np.repeat(np.linspace(0.0, _T, layers + 1), m)
-    points = np.column_stack([np.tile(flat, (layers + 1, 1)), z])
+    points = np.column_stack([np.tile(plane_points, (layers + 1, 1)), z])
     # Prisms divided from their smallest number: neighbours agree.
     p, q, r = np.concatenate([triangles + layer * m for layer in range(layers)]).T
     split = [[p, q, r, r + m], [p, q, q + m, r + m], [p, p + m, q + m, r + m]]
     cells = np.concatenate([np.stack(each, axis=1) for each in split])
-    bare = Mesh(points, cells)
-    radius = np.linalg.norm(points[bare.boundary][..., :2], axis=2)
-    rim = bare.boundary[(radius > (1 - 1e-9) * _OUTER).all(axis=1)]
-    return Mesh(points, bare.cells, {"rim": rim})
+    body = Mesh(points, cells)
+    radius = np.linalg.norm(points[body.boundary][..., :2], axis=2)
+    rim = body.boundary[(radius > (1 - 1e-9) * _OUTER).all(axis=1)]
+    return Mesh(points, body.cells, {"rim": rim})
 
 
 def _pull(x: Floats, normal: Floats) -> Floats:

@@ -40,13 +40,16 @@ def _cycle(level: int, order: int) -> list[Value]:
     )  # fmt: skip
     solutions = solve(problem, states)
     K = [sif.K_II / _ROOT for sif in stress_intensities(solutions)]
-    taken = solutions[3].dissipated + solutions[4].dissipated
+    work = solutions[3].dissipated + solutions[4].dissipated
     loss = 4 * np.pi * mu * (range_ - 2 * mu) * (1 - NU**2) / E
-    close = {1: 1e-2, 2: 1e-3}[order]
+    tolerance = {1: 1e-2, 2: 1e-3}[order]
     return [
-        *(Value(f"K_II at tip {k}", K[4][k], sign * felt, close) for k, sign in ((0, -1), (1, 1))),
-        Value("K_II at the other end of the cycle", K[3][1], -felt, close),
-        Value("energy of a cycle", taken, loss, {1: 4e-2, 2: 2e-3}[order]),
+        *(
+            Value(f"K_II at tip {k}", K[4][k], sign * felt, tolerance)
+            for k, sign in ((0, -1), (1, 1))
+        ),
+        Value("K_II at the other end of the cycle", K[3][1], -felt, tolerance),
+        Value("energy of a cycle", work, loss, {1: 4e-2, 2: 2e-3}[order]),
     ]
 
 
@@ -63,9 +66,9 @@ def _stick(level: int, order: int) -> list[Value]:
     assert contact.shear is not None
     assert contact.slip is not None
     # Lip + is pushed by p n, and sheared by the traction that an uncracked body has there.
-    wrong = np.abs(np.abs(contact.shear) - 0.8).max()
+    error = np.abs(np.abs(contact.shear) - 0.8).max()
     return [
-        Value("largest error of the shear", float(wrong), 0.0, 1e-9, 0.8),
+        Value("largest error of the shear", float(error), 0.0, 1e-9, 0.8),
         Value("largest slip", float(np.abs(contact.slip).max()), 0.0, 1e-9, 1.0 / E),
         Value("largest error of the pressure", float(np.abs(contact.pressure - 1).max()), 0.0,
               1e-9, 1.0),

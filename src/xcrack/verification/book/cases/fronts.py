@@ -39,7 +39,7 @@ def _open(level: int, h: float, b: float | None, order: int, **shape: Any) -> li
     return values
 
 
-def _closed(level: int) -> list[Value]:
+def _closed_penny(level: int) -> list[Value]:
     problem, Q = flat_crack(0.17 / 2**level, _CLOSED, order=1)
     solution = solve(problem)
     sif, contact = stress_intensity(solution), solution.contact[0]
@@ -68,7 +68,7 @@ _IN_SPACE = (
     Case("ellipse-1", "K_fronts", _ELLIPSE, "exact", 3, 1, False,
          partial(_open, h=0.06, b=0.3, order=1, half=1.2, margin=0.11, depth=0.17), 1,
          quick=False),
-    Case("penny-closed-1", "sliding", _PENNY, "exact", 3, 1, True, _closed, 2),
+    Case("penny-closed-1", "sliding", _PENNY, "exact", 3, 1, True, _closed_penny, 2),
 )  # fmt: skip
 
 
@@ -82,11 +82,11 @@ _FIT = "fit to finite elements, good to 5 % (Newman and Raju, 1981)"
 def _at_surface_run(level: int, corner: bool) -> list[Value]:
     h = 0.15 / 2**level
     low = 0.0 if corner else -_B
-    fine = (0.0 if corner else -_C - 0.15, _C + 0.15)
+    fine_range = (0.0 if corner else -_C - 0.15, _C + 0.15)
     problem = Problem(
         graded(
             [
-                lines(low, _B, fine, h),
+                lines(low, _B, fine_range, h),
                 lines(-4.0, 4.0, (-0.2, 0.2), h),
                 lines(-_T, 0.0, (-_A - 0.15, 0.0), h),
             ],

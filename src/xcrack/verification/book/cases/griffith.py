@@ -32,10 +32,14 @@ def _scene(
     )  # fmt: skip
 
 
-def _values(sif: SIF, within: float, unit: float = 1.0, rate: float | None = None) -> list[Value]:
+def _values(
+    sif: SIF, tolerance: float, unit: float = 1.0, rate: float | None = None
+) -> list[Value]:
     # The normal is the same at both tips: K_II changes its sign.
     return [
-        Value(f"K_{mode} at tip {tip}", sif.K[tip, m] / _ROOT / unit, reference, within, 1.0, rate)
+        Value(
+            f"K_{mode} at tip {tip}", sif.K[tip, m] / _ROOT / unit, reference, tolerance, 1.0, rate
+        )
         for m, (mode, pair) in enumerate((("I", (_SYY, _SYY)), ("II", (-_SXY, _SXY))))
         for tip, reference in enumerate(pair)
     ]
@@ -48,8 +52,8 @@ def _K_run(level: int, order: int) -> list[Value]:
 def _bars_run(level: int, order: int) -> list[Value]:
     """Distance of the best K from the exact one, in half-widths of its bar: at most one."""
     sif = stress_intensity(solve(_scene(level, order)[0]), error=True)
-    exact = _ROOT * np.array([[_SYY, -_SXY], [_SYY, _SXY]])
-    share = (sif.best - exact) / sif.bar
+    exact_K = _ROOT * np.array([[_SYY, -_SXY], [_SYY, _SXY]])
+    share = (sif.best - exact_K) / sif.bar
     return [
         Value(f"K_{'I' * (m + 1)} at tip {k}, in bars", share[k, m], 0.0, 1.0, 1.0)
         for k in (0, 1)
@@ -59,15 +63,15 @@ def _bars_run(level: int, order: int) -> list[Value]:
 
 def _stress_run(level: int, order: int) -> list[Value]:
     T = stress_intensity(solve(_scene(level, order)[0])).T
-    within = {1: 2e-2, 2: 5e-4}[order]
-    return [Value(f"T at tip {k}", T[k], _SXX - _SYY, within, 1.0) for k in (0, 1)]
+    tolerance = {1: 2e-2, 2: 5e-4}[order]
+    return [Value(f"T at tip {k}", T[k], _SXX - _SYY, tolerance, 1.0) for k in (0, 1)]
 
 
 def _energy_run(level: int, order: int) -> list[Value]:
     problem, field = _scene(level, order, radius=0.4)
     error = energy_error(solve(problem), lambda x: field(x)[1])
-    within = {1: 0.12, 2: 0.012}[order]
-    return [Value("error in energy", error, 0.0, within, 1.0, rate={1: 0.9, 2: 1.6}[order])]
+    tolerance = {1: 0.12, 2: 0.012}[order]
+    return [Value("error in energy", error, 0.0, tolerance, 1.0, rate={1: 0.9, 2: 1.6}[order])]
 
 
 def _units_run(level: int, angle: float, E: float) -> list[Value]:

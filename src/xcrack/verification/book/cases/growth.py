@@ -41,14 +41,14 @@ def _path(level: int) -> list[Value]:
     )  # fmt: skip
     x = collect(steps).cracks[0].points
     last = np.degrees(np.arctan2(*(x[-1] - x[-2])[::-1]))
-    off = np.abs((x + x[::-1]) / 2 - [-0.01, 0.005]).max()
+    deviation = np.abs((x + x[::-1]) / 2 - [-0.01, 0.005]).max()
     return [
         Value("direction of the last step, degrees", float(last), 0.0, 6.0, 1.0),
-        Value("deviation from antisymmetry", float(off), 0.0, 0.02, 1.0),
+        Value("deviation from antisymmetry", float(deviation), 0.0, 0.02, 1.0),
     ]
 
 
-def _straight(level: int) -> list[Value]:
+def _straight_path(level: int) -> list[Value]:
     """An edge crack across the load stays straight on a mesh that is its own mirror image."""
     problem = Problem(
         box((0.0, -1.0), (1.0, 1.0), (20 * 2**level, 40 * 2**level)),
@@ -99,19 +99,19 @@ def _restart(level: int) -> list[Value]:
     }  # fmt: skip
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        whole = collect(grow(**run), folder / "whole").table()
+        whole_run = collect(grow(**run), folder / "whole").table()
         collect(grow(**run), folder / "stopped", until=lambda step: step.index == 0)
-        again = resume(folder / "stopped", **run).table()
-    differ = float(np.frombuffer(whole.tobytes(), np.uint8).size != len(again.tobytes()))
+        resumed_run = resume(folder / "stopped", **run).table()
+    differ = float(np.frombuffer(whole_run.tobytes(), np.uint8).size != len(resumed_run.tobytes()))
     if not differ:
-        differ = float(np.count_nonzero(whole.view(np.uint8) != again.view(np.uint8)))
+        differ = float(np.count_nonzero(whole_run.view(np.uint8) != resumed_run.view(np.uint8)))
     return [Value("bytes that differ", differ, 0.0, 0.0, 1.0)]
 
 
 CASES = (
     Case("inclined-path", "path", "a crack turns across the load, antisymmetry", "exact", 2, 1,
          False, _path, 2),
-    Case("straight-path", "path", "symmetry", "exact", 2, 2, False, _straight),
+    Case("straight-path", "path", "symmetry", "exact", 2, 2, False, _straight_path),
     Case("round-front", "fronts", "a penny under tension stays a circle", "exact", 3, 1, False,
          _round, 2),
     Case("stopped-run", "restart", "the same run without a stop", "exact", 2, 1, True, _restart),

@@ -61,8 +61,8 @@ def _ellipse(x: Floats, crack: Crack) -> Floats:
     area = float(face_areas(crack.points, crack.faces).sum())
     half = (high - low)[:2] / 2
     a, b = half * np.sqrt(area / (np.pi * half[0] * half[1]))
-    off = x - (low + high) / 2
-    return ellipse_K_I(np.arctan2(off[:, 1] / b, off[:, 0] / a), float(a), float(b), 1.0)
+    offset = x - (low + high) / 2
+    return ellipse_K_I(np.arctan2(offset[:, 1] / b, offset[:, 0] / a), float(a), float(b), 1.0)
 
 
 def _cycles() -> float:

@@ -56,16 +56,16 @@ def _K_at_tips(name: str, stress: Floats, contact: str, level: int) -> Floats:
 
 
 def _open(level: int, name: str) -> list[Value]:
-    wrong = np.abs(np.abs(_K_at_tips(name, OPEN, "off", level)) - np.abs(K[name]))
-    error = wrong.max(axis=1) / np.linalg.norm(K[name], axis=1)
+    difference = np.abs(np.abs(_K_at_tips(name, OPEN, "off", level)) - np.abs(K[name]))
+    error = difference.max(axis=1) / np.linalg.norm(K[name], axis=1)
     return [Value(f"error of K, tip {k}", float(e), 0.0, 5e-4, 1.0) for k, e in enumerate(error)]
 
 
-def _pressed(level: int) -> list[Value]:
-    slid = np.abs(_K_at_tips("T", PRESSED, "on", level)[:, 1])
+def _pressed_junction(level: int) -> list[Value]:
+    slips = np.abs(_K_at_tips("T", PRESSED, "on", level)[:, 1])
     return [
         Value(f"K_II, tip {k}", float(slip), reference, 0.01)
-        for k, (slip, reference) in enumerate(zip(slid, K_PRESSED, strict=True))
+        for k, (slip, reference) in enumerate(zip(slips, K_PRESSED, strict=True))
     ]
 
 
@@ -75,7 +75,7 @@ _SOURCE = "conforming quarter-point triangles (benchmarks/baselines/network_2d.p
 def _slice(level: int) -> list[Value]:
     """The T through a slice in plane strain: an arm on another crack in space."""
     del level
-    across = [
+    points = [
         plane_crack([(x, y, z) for (x, z), y in zip((a, a, b, b), (0.6, -0.6, -0.6, 0.6))])
         for a, b in ((_RIGHT, _LEFT), (_ON - 0.6 * (_UP - _ON), _UP))
     ]
@@ -84,7 +84,7 @@ def _slice(level: int) -> list[Value]:
     problem = Problem(
         box((-1, -0.2, -1), (1, 0.2, 1), (21, 3, 21)),
         Isotropic(E, NU),
-        [across[0], arm(across[1], on=0, side=-1)],
+        [points[0], arm(points[1], on=0, side=-1)],
         loads=[traction(name, (t[0], 0.0, t[1])) for name, t in forces.items()],
         supports=[fix("front", axis=1), fix("back", axis=1)],
         contact="off",
@@ -98,8 +98,10 @@ def _slice(level: int) -> list[Value]:
                 (sif.x[is_of_front, 0].mean(), *np.abs(sif.K[is_of_front, :2]).mean(axis=0))
             )
     K_space = np.array([row[1:] for row in sorted(rows[:2]) + rows[2:]])
-    wrong = np.abs(K_space - np.abs(K["T"])).max(axis=1) / np.linalg.norm(K["T"], axis=1)
-    return [Value(f"error of K, front {k}", float(e), 0.0, 2e-3, 1.0) for k, e in enumerate(wrong)]
+    difference = np.abs(K_space - np.abs(K["T"])).max(axis=1) / np.linalg.norm(K["T"], axis=1)
+    return [
+        Value(f"error of K, front {k}", float(e), 0.0, 2e-3, 1.0) for k, e in enumerate(difference)
+    ]
 
 
 CASES = (
@@ -108,7 +110,7 @@ CASES = (
              partial(_open, name=name), 2)
         for name in LINES
     ),
-    Case("junction-pressed", "junctions", _SOURCE, "program", 2, 2, True, _pressed, 2),
+    Case("junction-pressed", "junctions", _SOURCE, "program", 2, 2, True, _pressed_junction, 2),
     Case("junction-space", "junctions", _SOURCE, "program", 3, 2, False, _slice, quick=False),
 )  # fmt: skip
 

@@ -42,7 +42,7 @@ def row_of_cracks(cells: int, order: int, height: int = 1) -> Problem:
     )
 
 
-def _grown(problem: Problem, law: Law, cycle: Cycle, n: int) -> tuple[float, float]:
+def _grow(problem: Problem, law: Law, cycle: Cycle, n: int) -> tuple[float, float]:
     """Half length of the crack after n advances, and the cycles until then."""
     run = grow(problem, law, weighted_angle, cycle, da=_GROWTH / n, max_steps=n + 1, progress=False)
     history = collect(run, keep_solutions=False)
@@ -50,11 +50,11 @@ def _grown(problem: Problem, law: Law, cycle: Cycle, n: int) -> tuple[float, flo
     return float(np.ptp(x)) / 2, history.life
 
 
-def _life(level: int, order: int, law: Law, cycle: Cycle, effective: float) -> list[Value]:
+def _life(level: int, order: int, law: Law, cycle: Cycle, dK_exponent: float) -> list[Value]:
     """Cycles of the row by a law that sees a share of the range; exact for m = 2."""
     cells = {1: 31, 2: 15}[order] * 2**level
-    a, N = _grown(row_of_cracks(cells, order), law, cycle, 4 * 2**level)
-    reference = lives.paris_life_periodic(_A0, a, _W, _C, effective)
+    a, N = _grow(row_of_cracks(cells, order), law, cycle, 4 * 2**level)
+    reference = lives.paris_life_periodic(_A0, a, _W, _C, dK_exponent)
     return [
         Value("half length", a, _A0 + _GROWTH, 1e-3),
         # No rate: what steps of second order leave is below the error of the first step's rates.
@@ -65,7 +65,7 @@ def _life(level: int, order: int, law: Law, cycle: Cycle, effective: float) -> l
 def _power(level: int, order: int) -> list[Value]:
     """The same with m = 3, by quadrature."""
     law = paris(_C, 3.0)
-    a, N = _grown(row_of_cracks({1: 31, 2: 15}[order] * 2**level, order), law, _CYCLE, 4 * 2**level)
+    a, N = _grow(row_of_cracks({1: 31, 2: 15}[order] * 2**level, order), law, _CYCLE, 4 * 2**level)
     reference = quad(lambda a: 1 / law(periodic_K(a, _W), 0.0), _A0, a, epsrel=1e-12)[0]
     return [Value("cycles", N, reference, {1: 4e-2, 2: 2e-3}[order])]
 
@@ -124,17 +124,17 @@ def _case(name: str, requirement: str, run: Any, order: int, source: str = _EDGE
 CASES = (
     *(
         Case(f"row-paris-{order}", "life", _EDGE, "exact", 2, order, False,
-             partial(_life, order=order, law=paris(_C, 2.0), cycle=_CYCLE, effective=1.0), 2)
+             partial(_life, order=order, law=paris(_C, 2.0), cycle=_CYCLE, dK_exponent=1.0), 2)
         for order in (1, 2)
     ),
     _case("row-paris-m3-2", "life", partial(_power, order=2), 2),
     _case("row-elber-2", "ratio",
           partial(_life, order=2, law=elber(_C, 2.0, a=0.5, b=0.4), cycle=Cycle(_R, 1.0),
-                  effective=(0.5 + 0.4 * _R) * (1 - _R)), 2,
+                  dK_exponent=(0.5 + 0.4 * _R) * (1 - _R)), 2,
           _EDGE + ", range U ΔK (Elber, 1971)"),
     _case("row-walker-2", "ratio",
           partial(_life, order=2, law=walker(_C, 2.0, gamma=0.5), cycle=Cycle(_R, 1.0),
-                  effective=(1 - _R) ** 0.5), 2,
+                  dK_exponent=(1 - _R) ** 0.5), 2,
           _EDGE + ", range ΔK / (1 - R)^(1 - γ) (Walker, 1970)"),
     _case("row-tolerance-2", "error_bars", _to_a_tolerance, 2),
     Case("cycle-rule", "life", "integrals of the law (closed form, quadrature)", "exact", 0, 0,

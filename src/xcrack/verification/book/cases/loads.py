@@ -28,7 +28,7 @@ _SOURCE = "superposition of Griffith's crack and a uniform stress"
 
 
 def _run(
-    level: int, order: int, taken: tuple[float, float, float], loads: Sequence[Load]
+    level: int, order: int, stress: tuple[float, float, float], loads: Sequence[Load]
 ) -> list[Value]:
     """K of Griffith's crack, whose sides have its displacement without that of a uniform stress."""
     field = turned(
@@ -36,7 +36,7 @@ def _run(
     )
 
     def sides(x: np.ndarray) -> np.ndarray:
-        uniform = potentials_2d.uniform_stress(x[:, 0], x[:, 1], *taken, E, NU)[0]
+        uniform = potentials_2d.uniform_stress(x[:, 0], x[:, 1], *stress, E, NU)[0]
         return np.asarray(field(x)[0] - uniform)
 
     n = 30 * 2**level
@@ -57,17 +57,17 @@ def _run(
     ]
 
 
-def _initial() -> list[Load]:
+def _initial_stress_load() -> list[Load]:
     sxx, syy, sxy = _INITIAL
     return [initial_stress(np.array([[sxx, sxy], [sxy, syy]]))]
 
 
 CASES = tuple(
     Case(f"{name}-{order}", requirement, _SOURCE, "exact", 2, order, False,
-         partial(_run, order=order, taken=taken, loads=loads), 2)
-    for name, requirement, taken, loads in (
+         partial(_run, order=order, stress=stress, loads=loads), 2)
+    for name, requirement, stress, loads in (
         ("face-pressure", "loads", (_PRESSURE, _PRESSURE, 0.0), [crack_pressure(_PRESSURE)]),
-        ("initial-stress", "loads", _INITIAL, _initial()),
+        ("initial-stress", "loads", _INITIAL, _initial_stress_load()),
         ("temperature", "temperature", (_THERMAL, _THERMAL, 0.0), [temperature(_HEAT, _EXPANSION)]),
     )
     for order in (1, 2)

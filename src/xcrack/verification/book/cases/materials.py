@@ -43,7 +43,7 @@ def _patch_run(level: int, order: int) -> list[Value]:
     return values
 
 
-def _beside_run(level: int, behind: bool) -> list[Value]:
+def _beside_run(level: int, is_behind: bool) -> list[Value]:
     n = 20 * 2**level
     return [
         Value(
@@ -51,7 +51,7 @@ def _beside_run(level: int, behind: bool) -> list[Value]:
             float(stress_intensity(solve(scenes.edge_crack(n, a, ratio))).K_I[0]), K, 4e-4,
         )
         for a, ratio, K in scenes.EDGE_CRACKS
-        if (a > 0.5) is behind
+        if (a > 0.5) is is_behind
     ]  # fmt: skip
 
 
@@ -125,9 +125,9 @@ CASES = (
     Case("materials-patch-2", "materials", "uniform strain of two materials side by side", "exact",
          2, 2, True, partial(_patch_run, order=2)),
     Case("materials-before", "materials", _PROGRAM, "program", 2, 2, False,
-         partial(_beside_run, behind=False), 2),
+         partial(_beside_run, is_behind=False), 2),
     Case("materials-behind", "materials", _PROGRAM, "program", 2, 2, False,
-         partial(_beside_run, behind=True), 2),
+         partial(_beside_run, is_behind=True), 2),
     Case("materials-mixed", "materials", _PROGRAM, "program", 2, 2, False, _mixed_run, 2),
     Case("materials-layers", "materials", "energy ahead of a crack in a clamped strip of layers",
          "exact", 2, 2, False, _layers_run, 2),

@@ -35,14 +35,14 @@ def _run(level: int, factor: float) -> list[Value]:
     E, nu = MATERIAL
     mesh = plate(2 * HALF[0], 2 * HALF[1], lower=(-HALF[0], -HALF[1]), size=5 * size,
                  size_near=size, holes=[(HOLE, RADIUS)], along=[CRACK])  # fmt: skip
-    along, mouth, tip = np.array([np.cos(ANGLE), np.sin(ANGLE)]), *np.array(CRACK)
-    frame = {1.0: np.array([-along[1], along[0]]), -1.0: -along}[factor]
+    direction, mouth, tip = np.array([np.cos(ANGLE), np.sin(ANGLE)]), *np.array(CRACK)
+    frame = {1.0: np.array([-direction[1], direction[0]]), -1.0: -direction}[factor]
     ends = [traction("top", (0.0, STRESS)), traction("bottom", (0.0, -STRESS))]
-    problem = Problem(mesh, Isotropic(E, nu, "strain"), [line_crack([mouth - along, tip])],
+    problem = Problem(mesh, Isotropic(E, nu, "strain"), [line_crack([mouth - direction, tip])],
                       loads=ends)  # fmt: skip
     solution = solve(problem, [factor])[0]
     G = energy_release_rate(stress_intensity(solution), problem.elasticity.material)
-    at = mouth[None] + 1e-6 * along
+    at = mouth[None] + 1e-6 * direction
     jump = solution.displacement(at, 1) - solution.displacement(at, -1)
     name = "opening at the mouth" if factor > 0 else "slip at the mouth"
     return [

@@ -93,8 +93,8 @@ def _scatter(level: int) -> list[Value]:
     pod = logistic_pod(0.6, 0.3)
     looks = inspection(history, interval=N / 5, pod=pod)
     at = np.arange(1, 5) * N / 5
-    missed = float(np.prod(1 - pod(_length(at))))
-    return [*values, Value("chance that all looks miss", looks.missed or 0.0, missed, 5e-3)]
+    chance_of_miss = float(np.prod(1 - pod(_length(at))))
+    return [*values, Value("chance that all looks miss", looks.missed or 0.0, chance_of_miss, 5e-3)]
 
 
 def _length(N: Floats) -> Floats:

@@ -24,7 +24,7 @@ _ZONE = plastic_zone(_YIELD, beta=2)
 _ROW = "K = s √(W tan(π a / W)) (Westergaard, 1939)"
 
 
-def _grown(
+def _grow(
     level: int, order: int, law: Law, spectrum: Spectrum, model: Retardation | None
 ) -> tuple[float, float]:
     """Half length of the cracks of a row after its growth, and the blocks until then."""
@@ -41,7 +41,7 @@ def _grown(
 def _blocks(level: int, order: int) -> list[Value]:
     """Ranges 1.0, 0.6 and 0.3 of different numbers: m = 2 has a closed form."""
     rows = [(0.0, 1.0, 2.0), (0.1, 0.7, 15.0), (0.2, 0.5, 100.0)]
-    a, N = _grown(level, order, paris(_C, 2.0), Spectrum(rows=rows), None)
+    a, N = _grow(level, order, paris(_C, 2.0), Spectrum(rows=rows), None)
     total = sum(count * (high - low) ** 2 for low, high, count in rows)
     reference = lives.paris_life_periodic(_A0, a, _W, _C, float(np.sqrt(total)))
     return [Value("blocks", N, reference, {1: 2e-2, 2: 3e-3}[order])]
@@ -50,7 +50,7 @@ def _blocks(level: int, order: int) -> list[Value]:
 def _overloads(level: int, order: int, model: Retardation) -> list[Value]:
     """An overload and small cycles; the sum cycle by cycle over K of the row."""
     spectrum = Spectrum([0.0, _OVER, *[0.0, _SMALL] * _N])
-    a, N = _grown(level, order, paris(_C, 3.0), spectrum, model)
+    a, N = _grow(level, order, paris(_C, 3.0), spectrum, model)
     reference = _by_hand(model, a)
     return [Value("blocks", N, reference, {1: 4e-2, 2: 3e-3}[order])]
 
@@ -64,11 +64,11 @@ def _by_hand(model: Retardation, last: float) -> float:
         if a + zone >= end:
             end, size, K_over = a + zone, zone, K
         if isinstance(model, wheeler):
-            grows = _C * K**3 * min((zone / (end - a)) ** model.w, 1.0)
+            growth = _C * K**3 * min((zone / (end - a)) ** model.w, 1.0)
         else:
-            lost = (K_over * math.sqrt((end - a) / size) - K) / (model.shutoff - 1)
-            grows = _C * (K - min(max(lost, 0.0), K)) ** 3
-        a, count = a + grows, count + 1
+            residual_K = (K_over * math.sqrt((end - a) / size) - K) / (model.shutoff - 1)
+            growth = _C * (K - min(max(residual_K, 0.0), K)) ** 3
+        a, count = a + growth, count + 1
     return count / (_N + 1)
 
 

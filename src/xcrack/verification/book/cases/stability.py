@@ -15,7 +15,7 @@ _SOURCE = "numerical inf-sup test (Chapelle and Bathe, 1993): the constant does 
 _MATERIAL = Isotropic(1.0, 0.3, plane="strain")
 
 
-def _flat(constants: dict[str, float]) -> list[Value]:
+def _one_mesh(constants: dict[str, float]) -> list[Value]:
     """The first is of order one, the others do not fall below it."""
     first, *others = constants.items()
     return [
@@ -28,10 +28,10 @@ def _flat(constants: dict[str, float]) -> list[Value]:
 
 
 def _meshes(level: int, order: int) -> list[Value]:
-    ahead, normal = rows(0.37)
-    crack = line_crack([0.11 * normal - 2 * ahead, 0.11 * normal + 2 * ahead])
+    direction, normal = rows(0.37)
+    crack = line_crack([0.11 * normal - 2 * direction, 0.11 * normal + 2 * direction])
     sizes = (8, 16, 32, 64)[: 2 + level]
-    return _flat(
+    return _one_mesh(
         {
             f"{n} cells a side": inf_sup(Problem(perturbed(n, 11), _MATERIAL, [crack], order=order))
             for n in sizes
@@ -47,7 +47,7 @@ def _cuts(level: int, order: int) -> list[Value]:
         crack = line_crack([(-1.1, y), (1.1, y)])
         problem = Problem(box((-1, -1), (1, 1), 16), _MATERIAL, [crack], order=order)
         result[f"{share:g} cells from a row"] = inf_sup(problem)
-    return _flat(result)
+    return _one_mesh(result)
 
 
 def _space(level: int) -> list[Value]:
@@ -56,7 +56,7 @@ def _space(level: int) -> list[Value]:
         crack = plane_crack([(-2, -2, 0.1), (2, -2, -0.05), (2, 2, -0.05), (-2, 2, 0.1)])
         mesh = perturbed(n, 23, lower=(-1,) * 3, upper=(1,) * 3)
         result[f"{n} cells a side"] = inf_sup(Problem(mesh, Isotropic(1.0, 0.3), [crack], order=1))
-    return _flat(result)
+    return _one_mesh(result)
 
 
 CASES = (
