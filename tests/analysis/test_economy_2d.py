@@ -70,7 +70,7 @@ def test_an_uncracked_problem_is_plain_fem_to_the_last_bit(order):
     assert len(model.space.enriched) == 0
     # The same linear system, solved by the same factorisation without anything of ours.
     solution = xc.solve(scene)
-    free = ~model.known.is_fixed
+    free = ~model.imposed_values.is_fixed
     K = sp.csr_matrix(naive_stiffness(mesh, order, STEEL.lam, STEEL.mu))
     f = np.zeros(K.shape[0])
     for ends in mesh.facet_sets["top"]:

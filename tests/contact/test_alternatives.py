@@ -240,7 +240,7 @@ def test_a_stiff_penalty_oscillates():
 def closed_condition(problem):
     """Condition number of the matrix that is factored with all lips closed, unit diagonal."""
     model = build(problem)
-    fixed = model.known.is_fixed.copy()
+    fixed = model.imposed_values.is_fixed.copy()
     fixed[free_motion(model.space, fixed).pins] = True
     engine = system(model.space, model.stiffness, fixed, problem.numerics)
     A = engine.basis_matrix

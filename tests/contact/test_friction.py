@@ -265,7 +265,7 @@ def test_energy_balances():
 def check_conditions(problem, solutions):
     """Coulomb's conditions at the points of the faces, and weak gaps, in every state."""
     mu, model = problem.friction, build(problem)
-    fixed, lips = model.known.is_fixed, model.lips[0]
+    fixed, lips = model.imposed_values.is_fixed, model.lips[0]
     space = multipliers(model.space, 0, lips, "reduced", fixed, has_friction=True)
     rows = gap_rows(space, lips, model.jumps[0])
     for solution in solutions:

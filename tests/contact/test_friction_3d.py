@@ -190,8 +190,8 @@ def test_one_tangent_is_the_problem_of_2d():
         F = rows.F.copy()
         F[: 2 * g, 2 * g :] = F[2 * g :, : 2 * g] = 0.0
         d[2 * g :] = 0.0
-        three = FrictionRows(F, rows.measure, rows.rubbing, rows.mu, 1.0)
-        two = FrictionRows(F[: 2 * g, : 2 * g], rows.measure, rows.rubbing, rows.mu, 1.0)
+        three = FrictionRows(F, rows.measure, rows.rubbing_rows, rows.mu, 1.0)
+        two = FrictionRows(F[: 2 * g, : 2 * g], rows.measure, rows.rubbing_rows, rows.mu, 1.0)
         expected = coulomb(two, d[: 2 * g], all_stuck(two)).lam
         lam = coulomb_3d(three, d, all_stuck(three)).lam
         assert np.abs(lam[: 2 * g] - expected).max() <= 1e-7 * np.abs(expected).max()

@@ -75,7 +75,9 @@ def slips_of(problem, before):
     from xcrack.analysis.multipliers import multipliers
 
     lips = model.lips[0]
-    m = multipliers(model.space, 0, lips, "reduced", model.known.is_fixed, has_friction=True)
+    m = multipliers(
+        model.space, 0, lips, "reduced", model.imposed_values.is_fixed, has_friction=True
+    )
     rows = tangential_rows(model.space, m, lips)[0]
     return (
         weak_slip(model, m, tangents(lips), before)[0],

@@ -85,7 +85,7 @@ def polynomials(bary, sign):
 def test_residuals_and_blocks_of_a_cracked_body():
     solution = cracked()
     space = solution.space
-    w = surplus(space, solution.factored.model.known.is_fixed)
+    w = surplus(space, solution.factored.model.imposed_values.is_fixed)
     body = solution.problem.elasticity
     residual, blocks = residuals(w, body, solution.coefficients[..., None])
     points = cell_points(space, np.arange(len(space.mesh.cells)), 3, 4)

@@ -151,8 +151,10 @@ def test_star_drops_what_is_dependent_and_nothing_else():
     def columns(eps):
         problem = beside_a_row(eps, 2)
         model = build(problem)
-        basis = scaled_basis(model.space, model.stiffness, model.known.is_fixed, problem.numerics)
-        return basis.shape[1], int((~model.known.is_fixed).sum())
+        basis = scaled_basis(
+            model.space, model.stiffness, model.imposed_values.is_fixed, problem.numerics
+        )
+        return basis.shape[1], int((~model.imposed_values.is_fixed).sum())
 
     for eps in (0.3, 1e-2, 1e-4):
         retained, free = columns(eps)

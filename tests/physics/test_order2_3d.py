@@ -114,7 +114,9 @@ def test_no_displacement_has_a_negative_energy(problem):
     The signs of the pivots are those of the eigenvalues (Sylvester's law of inertia).
     """
     model = build(problem)
-    basis = scaled_basis(model.space, model.stiffness, model.known.is_fixed, problem.numerics)
+    basis = scaled_basis(
+        model.space, model.stiffness, model.imposed_values.is_fixed, problem.numerics
+    )
     reduced = sp.csc_matrix(basis.T @ model.stiffness @ basis)
     factor = sla.splu(
         reduced, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}

@@ -28,7 +28,7 @@ def check(rows, d, state):
     assert pressure.min() >= 0
     assert gap[:g].min() >= -1e-9 * np.abs(d).max()
     assert np.abs(pressure * gap[:g]).max() <= 1e-12 * largest
-    bound = rows.mu * pressure[rows.rubbing]
+    bound = rows.mu * pressure[rows.rubbing_rows]
     assert (np.abs(shear) <= bound + 1e-11 * largest).all()
     slides = np.abs(slip) > 1e-10 * np.abs(d).max()
     # What slides bears all that friction can, against the slip.

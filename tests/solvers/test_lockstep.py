@@ -27,11 +27,11 @@ def test_products_of_several_vectors_are_those_of_each(dtype, count):
     x = rng.normal(size=(count, 17)).astype(dtype)
     x[-1, 3] = np.inf if count > 1 else x[-1, 3]  # must not spoil those beside it
     y = rng.normal(size=(count, first[-1])).astype(dtype)
-    alone = [matrix.added(own.copy(), -2.5, v) for own, v in zip(y, x)]
+    alone = [matrix.add_product(own.copy(), -2.5, v) for own, v in zip(y, x)]
     for k in range(0, count, 4):
         wide, sums = np.zeros((17, 4), dtype), np.zeros((first[-1], 4), dtype)
         wide[:, : len(x[k : k + 4])], sums[:, : len(x[k : k + 4])] = x[k : k + 4].T, y[k : k + 4].T
-        result = matrix.added(sums, -2.5, wide)
+        result = matrix.add_product(sums, -2.5, wide)
         for c, own in enumerate(alone[k : k + 4]):
             assert result[:, c].tobytes() == own.tobytes()
     exact = y[0] - 2.5 * (A @ x[0])

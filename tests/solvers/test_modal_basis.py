@@ -114,7 +114,7 @@ def test_unknowns_in_use_are_reported():
     assert row.unknowns == 2 * points
     assert "modes I to II only" in row.reason
     assert "modes I to II only" in xc.plan(problem)["tip functions"].reason
-    fixed = build(problem).known.is_fixed
+    fixed = build(problem).imposed_values.is_fixed
     # Four functions of two components a point are replaced by two modes.
     assert solution.report.operations["unknowns"] == int((~fixed).sum()) - 6 * points
 
@@ -147,7 +147,7 @@ def test_a_point_that_a_support_decides_goes_without():
     )
     model = build(problem)
     first = 2 * model.space.tips[0].point_to_function.max()
-    fixed = model.known.is_fixed.copy()
+    fixed = model.imposed_values.is_fixed.copy()
     fixed[first + 3] = True
     basis = scaled_basis(model.space, model.stiffness, fixed, problem.numerics, problem.material)
     assert not basis[first : first + 8].nnz

@@ -29,8 +29,8 @@ def test_blocks_of_rows_multiply_like_csr(sizes):
     x, y = np.random.default_rng(63).normal(size=(2, 50))
     x, y = x[:9], y[: A.shape[0]]
     np.testing.assert_allclose(blocks.times(x), A @ x, atol=1e-14)  # round-off
-    np.testing.assert_allclose(blocks.added(y.copy(), -0.7, x), y - 0.7 * (A @ x), atol=1e-14)
-    single = blocks.single().times(x.astype(np.float32))
+    np.testing.assert_allclose(blocks.add_product(y.copy(), -0.7, x), y - 0.7 * (A @ x), atol=1e-14)
+    single = blocks.in_single_precision().times(x.astype(np.float32))
     assert single.dtype == np.float32
     np.testing.assert_allclose(single, A @ x, atol=1e-5)  # round-off in single precision
 
@@ -86,7 +86,7 @@ def test_unknowns_that_are_not_free_take_no_part(monkeypatch):
     size = np.abs(left).max()
     assert np.abs(levels.matrix.times(x) - left @ x).max() <= 1e-14 * size  # round-off
     y = rng.normal(size=A.shape[0])
-    assert (levels.matrix.added(y.copy(), 2, x)[fixed] == y[fixed]).all()
+    assert (levels.matrix.add_product(y.copy(), 2, x)[fixed] == y[fixed]).all()
     top, below = levels.levels[0], levels.levels[1]
     P = np.array([top.prolong.times(e) for e in np.eye(top.prolong.shape[1], dtype=np.float32)]).T
     assert (P[fixed] == 0).all()

@@ -214,9 +214,9 @@ class Scene:
             loads=loads, order=order,
         )  # fmt: skip
         self.problem, self.model = problem, build(problem)
-        self.space, self.fixed = self.model.space, self.model.known.is_fixed
+        self.space, self.fixed = self.model.space, self.model.imposed_values.is_fixed
         self.f = total(problem, self.model, loads)
-        self.known = self.model.known.value
+        self.known = self.model.imposed_values.value
         self.stiffness = problem.material.E * n / 2
 
     def direct(self):
@@ -397,7 +397,7 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
     loads = [xc.traction("top", turning)] if supports else sides
     problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], supports, loads, order=order)
     model = build(problem)
-    space, fixed = model.space, model.known.is_fixed
+    space, fixed = model.space, model.imposed_values.is_fixed
     motion = free_motion(space, fixed)
     f = total(problem, model, loads)
     f = balanced_loads(space, motion, f[:, None])[0][:, 0]

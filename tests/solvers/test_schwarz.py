@@ -57,7 +57,9 @@ def penny():
         [xc.fix("bottom")], [xc.traction("top", (0.3, 0.2, 1.0))], contact="off", order=2,
     )  # fmt: skip
     model = build(problem)
-    return model, iterative_system(model.space, model.stiffness, model.bulk, model.known.is_fixed)
+    return model, iterative_system(
+        model.space, model.stiffness, model.bulk, model.imposed_values.is_fixed
+    )
 
 
 def test_stars_hold_what_ends_around_a_point(penny):
@@ -77,7 +79,7 @@ def test_stars_hold_what_ends_around_a_point(penny):
 
 def test_tip_functions_apart_from_their_star_couple_with_no_more(penny):
     model, _ = penny
-    K, free = model.stiffness, ~model.known.is_fixed
+    K, free = model.stiffness, ~model.imposed_values.is_fixed
     T = patch_orthogonal(model.space, K, free, "star")
     n = model.space.n_dof
     back = 2 * sp.identity(n) - T

@@ -69,7 +69,7 @@ def n_free(problem):
     from xcrack.analysis.solve import build
 
     model = build(problem)
-    return int((~model.known.is_fixed).sum())
+    return int((~model.imposed_values.is_fixed).sum())
 
 
 def K_of(problem, crack=0):
@@ -111,7 +111,11 @@ def condition(problem):
 
     model = build(problem)
     basis = scaled_basis(
-        model.space, model.stiffness, model.known.is_fixed, problem.numerics, problem.material
+        model.space,
+        model.stiffness,
+        model.imposed_values.is_fixed,
+        problem.numerics,
+        problem.material,
     )
     A = sp.csc_matrix(basis.T @ model.stiffness @ basis)
     A = (A + A.T) / 2

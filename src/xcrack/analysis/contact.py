@@ -87,7 +87,7 @@ class ContactSolution:
     active: tuple[Bools | None, ...]
     sets: int
     dual: Floats | None = None
-    rubbing: tuple[FrictionWork, ...] = ()
+    friction_work: tuple[FrictionWork, ...] = ()
     dissipated: tuple[float, ...] = ()
 
     def closed_sets(self) -> SolverState:
@@ -190,7 +190,7 @@ def solve_contact(
             u,
             *parts,
             sets,
-            rubbing=tuple(friction_solution.rubbing),
+            friction_work=tuple(friction_solution.work),
             dissipated=friction_solution.dissipated,
         )
     for c in expected_cracks:
@@ -295,7 +295,7 @@ def _overlapping_cracks(
             continue
         if c not in trials:
             trials[c] = multipliers(
-                model.space, c, lips, problem.numerics.multipliers, model.known.is_fixed,
+                model.space, c, lips, problem.numerics.multipliers, model.imposed_values.is_fixed,
                 material=material_numbers(problem),
             )  # fmt: skip
         trial = trials[c]
@@ -314,7 +314,7 @@ def _space(
     if method is not None:
         return cast(Multipliers, method.pressure_space(problem, model, c))
     kind = problem.numerics.multipliers
-    is_fixed, rub = model.known.is_fixed, has_friction(problem, c)
+    is_fixed, rub = model.imposed_values.is_fixed, has_friction(problem, c)
     if c in trials and not rub:
         return trials[c]
     return multipliers(
@@ -349,7 +349,7 @@ def contact_of(
 ) -> tuple[Contact | None, ...]:
     """Contact of each crack in state k, None where it has no multipliers."""
     result: list[Contact | None] = []
-    work_of_crack = {each.crack: each for each in solution.rubbing}
+    work_of_crack = {each.crack: each for each in solution.friction_work}
     for c, lips in enumerate(model.lips):
         m, pressure, is_active = solution.spaces[c], solution.pressure[c], solution.active[c]
         if m is None or pressure is None or is_active is None:

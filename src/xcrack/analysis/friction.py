@@ -343,7 +343,7 @@ def _open_functions(rows: FrictionRows, place: SlipPoint) -> Bools:
 def _friction_work(rows: FrictionRows, start_place: SlipPoint, state: FrictionState) -> float:
     """Work of the tractions of slipping functions: their mean bound over the substep times slip."""
     slips = state.status.slips
-    pressure = 0.5 * (np.maximum(start_place.lam, 0.0) + state.lam)[: rows.n][rows.rubbing]
+    pressure = 0.5 * (np.maximum(start_place.lam, 0.0) + state.lam)[: rows.n][rows.rubbing_rows]
     slip = np.sqrt((state.gap[rows.n :].reshape(rows.tangents, -1) ** 2).sum(axis=0))
     return float((rows.mu * pressure * slip)[slips].sum())
 
@@ -364,7 +364,7 @@ class FrictionSolution:
     """
 
     states: list[StateContact]
-    rubbing: list[FrictionWork]
+    work: list[FrictionWork]
     dissipated: tuple[float, ...]
     between: Floats
 
@@ -465,7 +465,7 @@ def solve_friction(
     rows = _rows(faces, condensed.dual, stiffness)
     if springs is not None:
         every = np.concatenate(springs)
-        diagonal = np.concatenate([every, np.tile(every[rows.rubbing], rows.tangents)])
+        diagonal = np.concatenate([every, np.tile(every[rows.rubbing_rows], rows.tangents)])
         method = problem.numerics.contact_method
         is_augmented = method is not None and method.updates
         rows = replace(
@@ -541,7 +541,7 @@ def _by_crack(
     faces: Sequence[_Face], rows: FrictionRows, places: Sequence[SlipPoint]
 ) -> list[FrictionWork]:
     shear = np.stack([place.lam[rows.n :].reshape(rows.tangents, -1) for place in places], axis=2)
-    is_stuck = np.stack([p.status.closed[rows.rubbing] & ~p.status.slips for p in places])
+    is_stuck = np.stack([p.status.closed[rows.rubbing_rows] & ~p.status.slips for p in places])
     result, first = [], 0
     for face in faces:
         rows_of_crack = slice(first, first + len(face.space.measure))

@@ -137,9 +137,9 @@ def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingre
 
 
 def _friction_row(row: Ingredient, contact: ContactSolution) -> Ingredient:
-    if not contact.rubbing:
+    if not contact.friction_work:
         return replace(row, used=False, reason="no crack with friction has faces that press")
-    return replace(row, unknowns=sum(len(each.shear) for each in contact.rubbing))
+    return replace(row, unknowns=sum(len(each.shear) for each in contact.friction_work))
 
 
 def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
@@ -178,7 +178,7 @@ def resultants(
         if load.is_listed
     ]
     for number, support in enumerate(problem.supports):
-        rows_of_support = model.known.owner == number
+        rows_of_support = model.imposed_values.owner == number
         rows.append(
             _resultant(
                 model, f"reaction of {support.name}", np.where(rows_of_support, residual, 0.0)

@@ -83,7 +83,7 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     energy = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *where))
     if energy <= 0:
         return None
-    free_forces = ~model.known.is_fixed[:n]
+    free_forces = ~model.imposed_values.is_fixed[:n]
     vector = sum(load_vector(space, elasticity, load, ())[:n] for load in stresses)
     f = np.where(free_forces, vector, 0.0)
     matrix = model.bulk.matrix
@@ -194,13 +194,13 @@ def _solve_states(
     model = build(problem, old_bulk)
     vectors = mesh_loads(model.space, model.bulk.loads)
     cases = [_case(problem, model, state, vectors) for state in states]
-    is_fixed = model.known.is_fixed.copy()
+    is_fixed = model.imposed_values.is_fixed.copy()
     free_motions = _fixed_unknowns(model, is_fixed)
     motion = free_motion(model.space, is_fixed, free_motions[1])
     engine = _engine(problem, model, is_fixed, motion, solver, reuse)
     f, imbalance = balanced_loads(model.space, motion, np.stack([case.f for case in cases], axis=1))
-    u_imposed = np.stack([case.known for case in cases], axis=1)
-    load_states = [case.acting for case in cases]
+    u_imposed = np.stack([case.u_imposed for case in cases], axis=1)
+    load_states = [case.load_state for case in cases]
     start = reuse or SolverState()
     contact_solution = solve_contact(
         problem, model, engine, f, u_imposed, start, load_states, is_repeated
@@ -210,18 +210,20 @@ def _solve_states(
         u = without_motion(motion, u)
     loads: tuple[MeshLoad, ...] = ()
     if reuse is not None:  # else there is no next step
-        all_loads = {id(load): load for case in cases for load in case.acting.loads}.values()
+        all_loads = {id(load): load for case in cases for load in case.load_state.loads}.values()
         pairs = [(load, vectors[id(load)]) for load in all_loads]
         loads = on_mesh(model.space, pairs, model.bulk.loads)
     end_state = replace(
         contact_solution.closed_sets(), bulk=replace(model.bulk, loads=loads, free=free_motions)
     )
-    if contact_solution.rubbing:
-        end_state = replace(end_state, slip=slip_of(model, contact_solution.rubbing, u[:, -1]))
+    if contact_solution.friction_work:
+        end_state = replace(
+            end_state, slip=slip_of(model, contact_solution.friction_work, u[:, -1])
+        )
     handed_on = engine.handed_on(end_state)
     factored = FactoredSolution(model, engine, motion, contact_solution) if error else None
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
-    first = cases[0].acting.loads
+    first = cases[0].load_state.loads
     unbalanced_share = None if reuse is not None else out_of_balance(problem, model, first)
     summary = report(
         problem, model, engine, contact_solution, motion, imbalance, len(states), unbalanced_share
@@ -230,12 +232,12 @@ def _solve_states(
     inner = times(engine.matrix, u)
     for k, (state, case) in enumerate(zip(states, cases, strict=True)):
         forces = inner[:, k]
-        rows = resultants(problem, model, case.acting.loads, case.parts, forces - case.f)
+        rows = resultants(problem, model, case.load_state.loads, case.parts, forces - case.f)
         solutions.append(
             Solution(
                 problem=problem,
                 state=state,
-                acting=case.acting,
+                acting=case.load_state,
                 space=model.space,
                 u=lock(np.ascontiguousarray(u[:, k])),
                 lips=model.lips,
@@ -299,10 +301,10 @@ def _engine(
 class LoadCase:
     """A load state: its vector, those of each load, and imposed displacements."""
 
-    acting: LoadState
+    load_state: LoadState
     f: Floats
     parts: tuple[Floats, ...]
-    known: Floats
+    u_imposed: Floats
 
 
 def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats]) -> LoadCase:
@@ -316,14 +318,16 @@ def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats
         vector = vectors[id(load)]
         parts.append(vector if factor == 1 else factor * vector)
     f = sum(parts, np.zeros(model.space.n_dof))
-    u_imposed = load_state.factor * model.known.value
+    u_imposed = load_state.factor * model.imposed_values.value
     moved_supports = [(load, factor) for load, factor in load_state if "support" in load.acts]
     for factor in sorted({factor for _, factor in moved_supports}):
         imposed_values = known_unknowns(
             model.space, [cast(Support, x) for x, f in moved_supports if f == factor]
         )
         u_imposed = np.where(
-            imposed_values.is_fixed & model.known.is_fixed, factor * imposed_values.value, u_imposed
+            imposed_values.is_fixed & model.imposed_values.is_fixed,
+            factor * imposed_values.value,
+            u_imposed,
         )
     largest = max(np.abs(f).max(initial=0.0), np.abs(u_imposed).max(initial=0.0))
     if not largest < _LARGEST:

@@ -144,10 +144,10 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
             f"read_case: changes = {value_text(changes)}: give a dict of keys and values."
         )
     root = read_tables(file, {str(key): value for key, value in (changes or {}).items()})
-    root.known(_SECTIONS)
+    root.check_names(_SECTIONS)
     problem = _problem(root)
     solving, output = root.table("solve"), root.table("output")
-    output.known(_OUTPUT)
+    output.check_names(_OUTPUT)
     growth = _growth(root.table("growth")) if "growth" in root else None
     for name in ("life", "retarded", "inspection", "strength"):
         if name in root and growth is None:
@@ -162,14 +162,14 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
         folder=file.parent / output.text("folder", f"{file.stem}_results"),
         pictures=tuple(_texts(output, "pictures")),
         warp=_number(output, "warp", 0.0),
-        solving=_solving(solving),
+        solving=_solve_arguments(solving),
         life=life_of(root.table("life"), problem, growth) if growth and "life" in root else None,
         inspection=inspection_of(root.table("inspection")) if "inspection" in root else None,
         strength=strength_of(root.table("strength"), problem, growth)
         if growth and "strength" in root
         else None,
         keep_solutions=_flag(output, "keep_solutions", True),
-        until=_until(root.table("growth"), problem.mesh),
+        until=_end_conditions(root.table("growth"), problem.mesh),
         retarded=tuple(retarded_of(each, problem, growth) for each in root.tables("retarded"))
         if growth
         else (),
@@ -202,7 +202,7 @@ def _problem(root: Table) -> Problem:
     }  # fmt: skip
     scene["numerics"] = _numerics(root.table("numerics"))
     solve_table = root.table("solve")
-    solve_table.known((*_CHOICES, "states", *_SOLVING))
+    solve_table.check_names((*_CHOICES, "states", *_SOLVING))
     chosen = {name: values.argument_of(solve_table, name, Problem) for name in _CHOICES
               if name in solve_table}  # fmt: skip
     (body,) = given_bodies
@@ -312,7 +312,7 @@ def _is_one(table: Table, kind: type) -> bool:
 def _numerics(table: Table) -> Numerics:
     """Choices of method; those for comparison stay in scripts."""
     names = [f.name for f in fields(Numerics) if f.name not in METHODS]
-    table.known(names)
+    table.check_names(names)
     return values.called_with(table, Numerics)  # type: ignore[no-any-return]
 
 
@@ -337,7 +337,7 @@ def _criterion(table: Table) -> Any:
         chosen.refuse("kind", f"known are {', '.join(values.CRITERIA)}.")
     criterion_of_kind = values.CRITERIA[kind]
     argument_names = [name for name in arguments_of(criterion_of_kind) if name not in ("K", "nu")]
-    chosen.known(["kind", *argument_names], f" of {kind!r}")
+    chosen.check_names(["kind", *argument_names], f" of {kind!r}")
     choices = {}
     for name in chosen.content:
         if name != "kind":
@@ -357,7 +357,7 @@ def _growth(table: Table) -> Mapping[str, Any]:
             table.refuse(
                 name, f"it is a function: a script gives it, grow(case.problem, {name}=...)."
             )
-    table.known(("law", "criterion", "cycle", "spectrum", "da", "until", *options))
+    table.check_names(("law", "criterion", "cycle", "spectrum", "da", "until", *options))
     if "law" not in table:
         table.refuse("", "the key 'law' is missing: give it.")
     arguments = {
@@ -383,7 +383,7 @@ def _growth(table: Table) -> Mapping[str, Any]:
     })  # fmt: skip
 
 
-def _until(table: Table, mesh: Mesh) -> tuple[str, ...] | None:
+def _end_conditions(table: Table, mesh: Mesh) -> tuple[str, ...] | None:
     """Facet sets on which the cracks are when growth ends."""
     if "until" not in table:
         return None
@@ -403,7 +403,7 @@ def _solver(table: Table) -> Any:
     return SOLVERS[name]
 
 
-def _solving(table: Table) -> Mapping[str, Any]:
+def _solve_arguments(table: Table) -> Mapping[str, Any]:
     """Arguments of `solve`, or with a tolerance of `adapt`, beside problem and states."""
     maker = adapt if "tolerance" in table else solve
     arguments = {}

@@ -73,7 +73,7 @@ def loading(table: Table) -> Cycle | Spectrum:
         cycle = table.table("cycle")
         if "states" not in cycle:
             return called_with(cycle, Cycle)  # type: ignore[no-any-return]
-        cycle.known(("states",), " beside states")
+        cycle.check_names(("states",), " beside states")
         try:
             return Cycle(states=load_states(cycle, "states"))
         except XcrackError as error:
@@ -90,7 +90,7 @@ def loading(table: Table) -> Cycle | Spectrum:
         )
     maker = _HISTORIES[kind]
     names = list(arguments_of(maker)) if maker else [kind, *(["sequence"] * (kind == "states"))]
-    spectrum_table.known(["kind", *names, *_CHOICES], f" of {kind!r}")
+    spectrum_table.check_names(["kind", *names, *_CHOICES], f" of {kind!r}")
     choices: dict[str, Any] = {
         name: (
             tuple(value_of_table(load, makers_of(Load)) for load in spectrum_table.tables(name))
@@ -198,7 +198,7 @@ def _check_points(x: Floats, y: Floats, what: str, other: str) -> None:
 
 def _scatter(table: Table) -> Scatter:
     """What varies, by its name."""
-    table.known(arguments_of(Scatter))
+    table.check_names(arguments_of(Scatter))
     arguments: dict[str, Any] = {
         name: _distribution(table.table(name), name)
         for name in table.content
@@ -246,7 +246,7 @@ def life_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Mappin
     ProblemError
         A wrong key, unit or value; with file and line.
     """
-    table.known([name for name in arguments_of(life) if name not in _OF_RUN])
+    table.check_names([name for name in arguments_of(life) if name not in _OF_RUN])
     for name in ("scatter", "seed"):
         if name not in table:
             table.refuse("", f"the key {name!r} is missing: give it.")
@@ -290,7 +290,7 @@ def inspection_of(table: Table) -> Mapping[str, Any]:
     ProblemError
         A wrong key, unit or value; with file and line.
     """
-    table.known([name for name in arguments_of(inspection) if name not in _OF_RUN])
+    table.check_names([name for name in arguments_of(inspection) if name not in _OF_RUN])
     arguments = {
         name: argument_of(table, name, inspection) for name in table.content if name != "pod"
     }
@@ -309,7 +309,7 @@ def strength_of(table: Table, problem: Problem, growth: Mapping[str, Any]) -> Ma
     ProblemError
         A wrong key, unit or value, or no toughness; with file and line.
     """
-    table.known([name for name in arguments_of(residual_strength) if name not in _OF_RUN])
+    table.check_names([name for name in arguments_of(residual_strength) if name not in _OF_RUN])
     material = problem.elasticity.material
     arguments: dict[str, Any] = {"nu": _poisson(table, problem)}
     of_body = {"K_c": growth.get("K_c", material.K_c), "yield_stress": material.yield_stress}

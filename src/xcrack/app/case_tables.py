@@ -50,7 +50,7 @@ class Table:
     def __contains__(self, name: str) -> bool:
         return name in self.content
 
-    def known(self, names: Iterable[str], what: str = "") -> None:
+    def check_names(self, names: Iterable[str], what: str = "") -> None:
         """Refuse keys that are not among these."""
         names = list(names)
         for name in self.content:
@@ -160,7 +160,7 @@ def read_tables(path: Path, changes: Mapping[str, Any] | None = None) -> Table:
     source = Source(path, _lines(text))
     root = Table(source, (), content)
     units = root.table("units")
-    units.known(("length", "force"))
+    units.check_names(("length", "force"))
     try:
         units_of_file = Units(**units.content)
     except ProblemError as error:

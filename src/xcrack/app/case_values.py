@@ -200,7 +200,7 @@ def called_with(
     all_arguments = dict(arguments or {})
     if "units" in parameters and "units" not in table:  # those of the model
         all_arguments["units"] = _units_of_laws(table)
-    table.known(
+    table.check_names(
         [*other_names, *(name for name in parameters if name not in (arguments or {}))], what
     )
     for name, parameter in parameters.items():

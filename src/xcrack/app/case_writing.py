@@ -214,7 +214,7 @@ class _Writing:
             ]
         tables["solve"] = {"order": problem.order, "contact": problem.contact}
         if any(problem.frictions):
-            tables["solve"]["friction"] = self._plain(problem.friction, "friction")
+            tables["solve"]["friction"] = self._plain_value(problem.friction, "friction")
         tables["numerics"] = self._fields(numerics, "numerics")
         return {name: table for name, table in tables.items() if table}
 
@@ -236,7 +236,7 @@ class _Writing:
                 case "solver":
                     table[name] = self._name(value, SOLVERS, name)
                 case _:
-                    table[name] = self._plain(value, name)
+                    table[name] = self._plain_value(value, name)
         return table
 
     def states(self, states: Sequence[Any], what: str) -> list[Any]:
@@ -244,7 +244,7 @@ class _Writing:
         makers, result = values.makers_of(Load), []
         for n, state in enumerate(states):
             if np.ndim(state) == 0 and not isinstance(state, Load):
-                result.append(self._plain(state, f"{what}[{n}]"))
+                result.append(self._plain_value(state, f"{what}[{n}]"))
                 continue
             result.append([
                 self._table(load, makers, f"{what}[{n}][{k}], {load.name}")
@@ -255,9 +255,9 @@ class _Writing:
     def _loading(self, table: dict[str, Any], loading: Any) -> None:
         """The table of a cycle or of a spectrum."""
         name = "cycle" if isinstance(loading, Cycle) else "spectrum"
-        content = dict(self._given(loading))
+        content = dict(self._values_off_default(loading))
         content_of_file = {
-            field: self._plain(value, f"{name}: {field}")
+            field: self._plain_value(value, f"{name}: {field}")
             for field, value in content.items()
             if field not in ("states", "steady")
         }
@@ -271,7 +271,7 @@ class _Writing:
         if not isinstance(criterion, partial):
             return self._name(criterion, values.CRITERIA, "criterion")
         kind = self._name(criterion.func, values.CRITERIA, "criterion")
-        return {"kind": kind, **self._plain(criterion.keywords, "criterion")}
+        return {"kind": kind, **self._plain_value(criterion.keywords, "criterion")}
 
     def _crack(self, crack: Crack) -> dict[str, Any]:
         """A crack by its points, its faces, and the cracks on which it ends."""
@@ -311,11 +311,11 @@ class _Writing:
         if not is_dataclass(value):
             self._refuse(what, "function")
         return {
-            name: self._plain(field_value, f"{what}: {name}")
-            for name, field_value in self._given(value)
+            name: self._plain_value(field_value, f"{what}: {name}")
+            for name, field_value in self._values_off_default(value)
         }
 
-    def _given(self, value: Any) -> Iterator[tuple[str, Any]]:
+    def _values_off_default(self, value: Any) -> Iterator[tuple[str, Any]]:
         for name, argument in arguments_of(type(value)).items():
             field_value = getattr(value, name)
             default = argument.default
@@ -325,7 +325,7 @@ class _Writing:
                 continue
             yield name, field_value
 
-    def _plain(self, value: Any, what: str) -> Any:
+    def _plain_value(self, value: Any, what: str) -> Any:
         if value is None:
             return FREE
         if isinstance(value, np.ndarray | np.generic):
@@ -335,9 +335,11 @@ class _Writing:
         if isinstance(value, tuple) and hasattr(value, "_asdict"):  # a curve of a rate_table
             value = value._asdict()
         if isinstance(value, list | tuple):
-            return [self._plain(each, f"{what}[{k}]") for k, each in enumerate(value)]
+            return [self._plain_value(each, f"{what}[{k}]") for k, each in enumerate(value)]
         if isinstance(value, Mapping):
-            return {name: self._plain(each, f"{what}: {name}") for name, each in value.items()}
+            return {
+                name: self._plain_value(each, f"{what}: {name}") for name, each in value.items()
+            }
         if isinstance(value, Field):
             return self._field(value)
         if isinstance(value, Crack):

@@ -80,7 +80,7 @@ def _bytes(code: types.CodeType, without_docstring: bool = False) -> bytes:
     return b"\0".join(parts)
 
 
-def reads(function: types.FunctionType) -> Iterator[tuple[str, Any]]:
+def names_read(function: types.FunctionType) -> Iterator[tuple[str, Any]]:
     """Names and values of all that a function reads: closure, defaults, globals, in that order.
 
     Globals include those of functions defined inside it; of a module of the user's the attributes
@@ -254,7 +254,7 @@ class Description:
             return
         self.lines[name] = f"{function.__qualname__} {code_of(function)}"
         if self._is_new(function):
-            for key, value in reads(function):
+            for key, value in names_read(function):
                 self.add(f"{name}.{key}", value, owners, True)
 
     def _add_named(self, name: str, value: Any, owners: tuple[int, ...]) -> None:
@@ -267,7 +267,7 @@ class Description:
         for key, function in methods(kind):
             if self._is_new(function):
                 self.lines[f"{name}.{key}"] = code_of(function)
-                for read, value in reads(function):
+                for read, value in names_read(function):
                     self.add(f"{name}.{key}.{read}", value, owners, True)
 
     def _add_dataclass(self, name: str, value: Any, owners: tuple[int, ...], is_used: bool) -> None:
@@ -424,8 +424,8 @@ __all__ = [
     "is_public_library",
     "methods",
     "name_of",
+    "names_read",
     "only_compiled_differently",
     "package_of",
-    "reads",
     "wrapped_by",
 ]

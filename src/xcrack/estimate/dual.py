@@ -200,7 +200,7 @@ class DualSolutions:
     """
 
     z: Floats
-    which: Ints
+    set_number: Ints
     mu: Floats
     per_pressure: Floats
 

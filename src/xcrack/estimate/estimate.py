@@ -17,11 +17,11 @@ from xcrack.estimate.surplus import (
     HierarchicalSurplus,
     face_residual,
     goal_residual,
-    imposed,
+    imposed_coefficients,
     load_residual,
     residuals,
     shares,
-    solved,
+    solve_surplus,
     surplus,
 )
 
@@ -72,9 +72,9 @@ def estimate(
     space = factored.model.space
     groups = groups_of(factored)
     dual = duals(factored, groups, goals)
-    w = surplus(space, factored.model.known.is_fixed)
+    w = surplus(space, factored.model.imposed_values.is_fixed)
     m = dual.z.shape[2]
-    sets = np.unique(dual.which[[s.number for s in solutions]])
+    sets = np.unique(dual.set_number[[s.number for s in solutions]])
     columns = [np.stack([s.u for s in solutions], axis=1), *dual.z[sets]]
     nodal = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
     nodal = np.concatenate([nodal, np.zeros((1, *nodal.shape[1:]))])
@@ -86,15 +86,15 @@ def estimate(
         pressure = np.stack([pressure_on(s, c) for s in solutions], axis=1)
         if pressure.any():
             r_u += face_residual(w, lips, pressure)
-    e_u = solved(w, blocks, r_u)
-    imposed_values = [imposed(w, s) for s in solutions]
+    e_u = solve_surplus(w, blocks, r_u)
+    imposed_values = [imposed_coefficients(w, s) for s in solutions]
     goal = np.concatenate([goal_residual(w, g) for g in goals], axis=2)
     mus = tuple(np.zeros((len(solutions), len(lips), m)) for lips in factored.model.lips)
     eta, end = np.zeros((2, len(solutions), m))
     by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
     parts = np.zeros((len(solutions), len(w.fixed), m))
     for k, solution in enumerate(solutions):
-        set_number = int(dual.which[solution.number])
+        set_number = int(dual.set_number[solution.number])
         place = int(np.searchsorted(sets, set_number)) * m
         r = r_z[:, :, place : place + m] + goal
         for c, lips in enumerate(factored.model.lips):
@@ -110,7 +110,7 @@ def estimate(
         if groups is not None:
             end[k] = end_changes(groups, dual, groups.N @ solution.u, solution.number)
     numbers = [s.number for s in solutions]
-    return Estimate(eta, by_cell, w, parts, end, dual.z[dual.which[numbers]], mus)
+    return Estimate(eta, by_cell, w, parts, end, dual.z[dual.set_number[numbers]], mus)
 
 
 def pressure_on(solution: Solution, c: int) -> Floats:

@@ -178,7 +178,7 @@ def goal_residual(surplus: HierarchicalSurplus, goal: Goal) -> Floats:
     return result
 
 
-def solved(surplus: HierarchicalSurplus, blocks: Floats, residual: Floats) -> Floats:
+def solve_surplus(surplus: HierarchicalSurplus, blocks: Floats, residual: Floats) -> Floats:
     """Each function with its copy alone: block^-1 residual `(n + copies, 2, m)`, 0 where fixed."""
     copied_edges = np.nonzero(surplus.copy >= 0)[0]
     copies = surplus.copy[copied_edges]
@@ -368,7 +368,7 @@ def face_residual(surplus: HierarchicalSurplus, lips: LipPoints, pressure: Float
     return result
 
 
-def imposed(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
+def imposed_coefficients(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
     """Imposed displacements less their interpolant, as surplus coefficients `(n + copies, 2)`.
 
     Displacements that are fitted beside a crack count as exact.

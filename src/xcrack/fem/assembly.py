@@ -312,7 +312,7 @@ class Stiffness:
         """Forces `(n_dof,)` or `(n_dof, k)` of displacements of the same shape."""
         return _product((self.body, self.enriched), x)
 
-    def joined(self, rows: Bools | None = None) -> sp.csr_matrix:
+    def sum_of_rows(self, rows: Bools | None = None) -> sp.csr_matrix:
         """The sum, of all rows or of some functions `(n_functions,)`; others are empty."""
         from xcrack.fem.kernels.stiffness import joined_blocks
 
@@ -646,7 +646,7 @@ def _chunks(space: FunctionSpace, points: Points, cells: Ints) -> list[Ints]:
 
 def total_stiffness(bulk_: Bulk, blocks: Enriched) -> sp.csr_matrix:
     """Stiffness of all unknowns."""
-    return Stiffness(bulk_.matrix, blocks).joined()
+    return Stiffness(bulk_.matrix, blocks).sum_of_rows()
 
 
 def rigid_modes(x: Floats) -> Floats:

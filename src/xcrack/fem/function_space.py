@@ -24,7 +24,7 @@ from xcrack.fem.enrichment import (
     tip_radii,
 )
 from xcrack.fem.joints_2d import Joint
-from xcrack.fem.williams import polar, tip_values
+from xcrack.fem.williams import polar_coordinates, tip_values
 from xcrack.mesh.mesh import Mesh, local_edges
 from xcrack.mesh.simplex import cell_nodes, node_points
 from xcrack.model.numerics import Numerics
@@ -329,7 +329,7 @@ class FunctionSpace:
         for tip in self.tips:
             levels = self.cuts[tip.crack].level_set
             phi = levels.phi
-            r, theta = polar(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
+            r, theta = polar_coordinates(levels.psi[tip.number], phi, np.where(phi == 0, 1, 0))
             shifts.append(lock(tip_values(r, theta, tip.functions)))
         return tuple(shifts)
 

@@ -42,7 +42,7 @@ class System:
     lips: tuple[LipPoints, ...]
     bulk: Bulk
     enriched: Enriched
-    known: ImposedValues
+    imposed_values: ImposedValues
     n_points: int
 
     @cached_property
@@ -53,7 +53,7 @@ class System:
     @cached_property
     def stiffness(self) -> Any:
         """Stiffness of all unknowns, a sparse matrix made when first asked for."""
-        return self.parts.joined()
+        return self.parts.sum_of_rows()
 
     @cached_property
     def jumps(self) -> tuple[Any, ...]:

@@ -5,7 +5,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints
 
 
-def polar(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
+def polar_coordinates(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Floats]:
     """Radius and angle in (-pi, pi] from the level sets; `side` decides the angle on a lip.
 
     `side` is +1 or -1 where the point belongs to a known side of the crack, else 0. A point with
@@ -30,7 +30,7 @@ def continued_polar(xi: Floats, side: Ints, is_kinked_face: Bools) -> tuple[Floa
     return r, np.where(is_behind & (side < 0) & (theta > 0), theta - 2 * np.pi, theta)
 
 
-def angular(theta: Floats) -> tuple[Floats, Floats]:
+def angular_functions(theta: Floats) -> tuple[Floats, Floats]:
     """Angular parts of the tip functions and their derivatives `(..., 4)`.
 
     F = sqrt(r) {cos(t/2), sin(t/2), sin(t/2) sin(t), cos(t/2) sin(t)}; only the second jumps.
@@ -44,12 +44,12 @@ def angular(theta: Floats) -> tuple[Floats, Floats]:
 
 def tip_values(r: Floats, theta: Floats, n: int = 4) -> Floats:
     """The first n tip functions `(..., n)`, sqrt(length)."""
-    return np.sqrt(r)[..., None] * angular(theta)[0][..., :n]
+    return np.sqrt(r)[..., None] * angular_functions(theta)[0][..., :n]
 
 
 def tip_derivatives(r: Floats, theta: Floats, n: int = 4) -> tuple[Floats, Floats]:
     """Derivatives of the tip functions along (ahead, normal), `(..., n)` each."""
-    g, dg = angular(theta)
+    g, dg = angular_functions(theta)
     scale = 1 / np.sqrt(r)[..., None]
     C, S = np.cos(theta)[..., None], np.sin(theta)[..., None]
     slope_ahead = scale * (0.5 * g * C - dg * S)

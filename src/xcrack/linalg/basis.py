@@ -89,7 +89,7 @@ def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     return home
 
 
-def restricted(blocks: Blocks, is_free: Bools) -> Blocks:
+def restrict_blocks(blocks: Blocks, is_free: Bools) -> Blocks:
     """Blocks without the unknowns that supports decide."""
     keep = is_free[blocks.members]
     block, place = ranges(np.diff(blocks.offsets))

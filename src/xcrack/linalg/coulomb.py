@@ -47,7 +47,7 @@ class FrictionRows:
 
     F: Floats
     measure: Floats
-    rubbing: Ints
+    rubbing_rows: Ints
     mu: Floats
     stiffness: float
     compliance: Floats | None = None
@@ -61,12 +61,14 @@ class FrictionRows:
     @property
     def tangents(self) -> int:
         """Number of tangents."""
-        return (len(self.F) - self.n) // max(len(self.rubbing), 1)
+        return (len(self.F) - self.n) // max(len(self.rubbing_rows), 1)
 
     @property
     def sizes(self) -> Floats:
         """Measure of each row's function `(g + m r,)`."""
-        return np.concatenate([self.measure, np.tile(self.measure[self.rubbing], self.tangents)])
+        return np.concatenate(
+            [self.measure, np.tile(self.measure[self.rubbing_rows], self.tangents)]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +162,7 @@ def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Fl
     """Tractions that a status asks for, and the gaps and slips that they leave."""
     g, is_closed, slip = rows.n, status.closed, status.slip
     closed_rows = np.nonzero(is_closed)[0]
-    is_touching = is_closed[rows.rubbing]
+    is_touching = is_closed[rows.rubbing_rows]
     stuck_rows = np.nonzero(is_touching & (slip == 0))[0]
     slipping_rows = np.nonzero(is_touching & (slip != 0))[0]
     lam = np.zeros(len(d))
@@ -171,7 +173,7 @@ def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Fl
         # The traction of a slipping function goes with its pressure.
         spread = np.zeros((len(d), len(active_rows)))
         spread[active_rows, np.arange(len(active_rows))] = 1.0
-        column = place[rows.rubbing[slipping_rows]]
+        column = place[rows.rubbing_rows[slipping_rows]]
         spread[g + slipping_rows, column] = slip[slipping_rows] * rows.mu[slipping_rows]
         diagonal = np.diag(rows.F)[active_rows]
         is_movable = diagonal > 0
@@ -200,11 +202,11 @@ def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionStat
         lam, gap = of_status(rows, d, status)
         tolerance = _ROUND_OFF * float(np.abs(lam).max(initial=0.0))
         normal = lam[:g] - weight * gap[:g]
-        trial_shear = lam[g:] - weight[rows.rubbing] * gap[g:]
+        trial_shear = lam[g:] - weight[rows.rubbing_rows] * gap[g:]
         # Values at round-off of zero (faces that only touch) must not make the status flicker.
         is_closed = normal > 0.1 * tolerance
-        bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
-        is_sliding = is_closed[rows.rubbing] & (np.abs(trial_shear) > bound + tolerance)
+        bound = rows.mu * np.maximum(normal[rows.rubbing_rows], 0.0)
+        is_sliding = is_closed[rows.rubbing_rows] & (np.abs(trial_shear) > bound + tolerance)
         next_status = Status(
             is_closed, np.where(is_sliding, np.sign(trial_shear), 0.0).astype(np.int64)
         )
@@ -220,8 +222,8 @@ def _newton(rows: FrictionRows, d: Floats, status: Status) -> tuple[FrictionStat
 def _status_of(rows: FrictionRows, lam: Floats) -> Status:
     pressure, shear = lam[: rows.n], lam[rows.n :]
     is_closed = pressure > 0
-    bound = rows.mu * pressure[rows.rubbing]
-    is_sliding = is_closed[rows.rubbing] & (np.abs(shear) >= bound * (1 - 1e-9))
+    bound = rows.mu * pressure[rows.rubbing_rows]
+    is_sliding = is_closed[rows.rubbing_rows] & (np.abs(shear) >= bound * (1 - 1e-9))
     return Status(is_closed, np.where(is_sliding, np.sign(shear), 0.0).astype(np.int64))
 
 
@@ -229,7 +231,7 @@ def _sweep_functions(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) ->
     """Sweeps of Gauss-Seidel: each function's own problem is solved exactly, one by one."""
     F, g, lam = rows.F, rows.n, np.array(lam)
     partner = np.full(g, -1)
-    partner[rows.rubbing] = np.arange(len(rows.rubbing))
+    partner[rows.rubbing_rows] = np.arange(len(rows.rubbing_rows))
     gap = F @ lam + d
     for _ in range(sweeps):
         for i in range(g):
@@ -340,7 +342,7 @@ def _newton_on_cones(
             next_guess.direction.any(axis=0), guess.direction.any(axis=0)
         )
         direction_change = next_guess.direction - guess.direction
-        bound = rows.mu * np.maximum(lam[: rows.n], 0.0)[rows.rubbing]
+        bound = rows.mu * np.maximum(lam[: rows.n], 0.0)[rows.rubbing_rows]
         error = float(np.abs(bound * direction_change).max(initial=0.0))
         is_settled = error <= _CHANGE * largest
         is_stalled = error <= _STALL * largest and change >= 0.5 * last
@@ -357,13 +359,13 @@ def _next_status(rows: FrictionRows, lam: Floats, gap: Floats) -> FrictionStart:
     g, weight = rows.n, rows.stiffness / rows.measure
     tolerance = 1e-12 * float(np.abs(lam).max(initial=0.0))
     normal = lam[:g] - weight * gap[:g]
-    trial = (lam[g:] - np.tile(weight[rows.rubbing], 2) * gap[g:]).reshape(2, -1)
+    trial = (lam[g:] - np.tile(weight[rows.rubbing_rows], 2) * gap[g:]).reshape(2, -1)
     is_closed = normal > 0.1 * tolerance
-    bound = rows.mu * np.maximum(normal[rows.rubbing], 0.0)
+    bound = rows.mu * np.maximum(normal[rows.rubbing_rows], 0.0)
     size = np.sqrt((trial**2).sum(axis=0))
-    is_sliding = is_closed[rows.rubbing] & (size > bound + tolerance)
+    is_sliding = is_closed[rows.rubbing_rows] & (size > bound + tolerance)
     length = np.where(is_sliding, size, 1.0)
-    bound_of_row = rows.mu * np.maximum(lam[:g], 0.0)[rows.rubbing]
+    bound_of_row = rows.mu * np.maximum(lam[:g], 0.0)[rows.rubbing_rows]
     share = np.where(is_sliding, np.minimum(bound_of_row / length, 1.0), 0.0)
     return FrictionStart(is_closed, np.where(is_sliding, trial / length, 0.0), share)
 
@@ -374,7 +376,7 @@ def _linearised_solution(
     """Tractions of the linearised conditions, and the gaps and slips that they leave."""
     g, r = rows.n, len(rows.mu)
     closed_rows = np.nonzero(guess.closed)[0]
-    touching_rows = np.nonzero(guess.closed[rows.rubbing])[0]
+    touching_rows = np.nonzero(guess.closed[rows.rubbing_rows])[0]
     active_rows = np.concatenate([closed_rows, g + touching_rows, g + r + touching_rows])
     lam = np.zeros(len(d))
     is_sliding = np.asarray(guess.direction.any(axis=0))[touching_rows]
@@ -414,9 +416,9 @@ def _put_slip_conditions(
     number = touching_rows[chosen]
     s, share, mu = guess.direction[:, number], guess.share[number], rows.mu[number]
     t = [m + chosen, m + n + chosen]
-    column = place[rows.rubbing[number]]
+    column = place[rows.rubbing_rows[number]]
     scale_of_slip = np.array([scale[t[0]], scale[t[1]]])
-    weight = (rows.stiffness / rows.measure)[rows.rubbing[number]]
+    weight = (rows.stiffness / rows.measure)[rows.rubbing_rows[number]]
     slip = np.stack([A[t[0]] / scale_of_slip[0][:, None], A[t[1]] / scale_of_slip[1][:, None]])
     free_gap = np.stack([b[t[0]] / scale_of_slip[0], b[t[1]] / scale_of_slip[1]])
     line = np.arange(len(chosen))
@@ -438,7 +440,7 @@ def _swept_cones(rows: FrictionRows, d: Floats, lam: Floats, sweeps: int) -> Flo
     """Sweeps of projections: each function's tractions are corrected by its own gap and slip."""
     F, g, r, lam = rows.F, rows.n, len(rows.mu), np.array(lam)
     partner = np.full(g, -1)
-    partner[rows.rubbing] = np.arange(r)
+    partner[rows.rubbing_rows] = np.arange(r)
     gap = F @ lam + d
     for _ in range(sweeps):
         for i in range(g):

@@ -19,7 +19,7 @@ from xcrack.linalg.basis import (
     node_blocks,
     orthonormal_functions,
     patch_orthogonal,
-    restricted,
+    restrict_blocks,
 )
 from xcrack.linalg.engine import (
     CondensedSystem,
@@ -185,7 +185,7 @@ class DirectSystem:
         factor = self.factor
         b = self._loads(f, u_imposed)
         Y, places = factor.forward_sparse(N @ self.basis)
-        y = factor.forward(b)
+        y = factor.solve_lower(b)
         with one_blas_thread():
             F = Y.T @ Y
             d = N @ u_imposed + Y.T @ y[places]
@@ -195,7 +195,7 @@ class DirectSystem:
             with one_blas_thread():
                 total[places] += Y @ lam
             self.count.solves += b.shape[1]
-            return self._displacements_of(factor.backward(total), u_imposed)
+            return self._displacements_of(factor.solve_upper(total), u_imposed)
 
         return CondensedSystem(F, d, displacements)
 
@@ -445,7 +445,9 @@ def _enriched_columns(
         change = sp.csr_matrix(patch if change is None else change @ patch)
         K = sp.csr_matrix(patch.T @ K @ patch)
     if numerics.orthonormal != "none" and n > first:
-        Z = orthonormal_functions(K, restricted(node_blocks(space, numerics.orthonormal), is_free))
+        Z = orthonormal_functions(
+            K, restrict_blocks(node_blocks(space, numerics.orthonormal), is_free)
+        )
     else:
         chosen = first + np.nonzero(is_free[first:])[0]
         unit_entries = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))

@@ -21,7 +21,7 @@ from xcrack.linalg.basis import (
     node_blocks,
     orthonormal_functions,
     patch_orthogonal,
-    restricted,
+    restrict_blocks,
 )
 from xcrack.linalg.engine import (
     CondensedSystem,
@@ -104,7 +104,7 @@ class Parts:
         """Of the whole matrix."""
         return np.concatenate([self.levels.diagonal, self.enriched_block.diagonal()])
 
-    def stored(self, starts: Ints) -> BorderedFactor:
+    def border_factor(self, starts: Ints) -> BorderedFactor:
         """The whole matrix; `starts` are the first columns of the enriched nodes."""
         first = np.concatenate([starts, [self.enriched_block.shape[0]]])
         return BorderedFactor(
@@ -394,7 +394,7 @@ class IterativeSystem:
 
 
 def _joined_rows(K: sp.csr_matrix | Stiffness, rows: Bools | None = None) -> sp.csr_matrix:
-    return K.joined(rows) if isinstance(K, Stiffness) else K
+    return K.sum_of_rows(rows) if isinstance(K, Stiffness) else K
 
 
 def iterative_system(
@@ -440,10 +440,10 @@ def iterative_system(
     if stars and space.tips:
         tip_modes, inverse = _star_orthogonal_basis(space, near_entries, tip_modes, in_use)
     node_groups = node_blocks(space, "star" if stars else "node")
-    blocks = restricted(node_groups, in_use)
+    blocks = restrict_blocks(node_groups, in_use)
     enriched_columns, starts, block = enriched_basis(space, near_entries, blocks, levels, tip_modes)
     parts = parts_of(levels, near_entries, standard, enriched_columns)
-    border, diagonal = parts.stored(starts), parts.diagonal
+    border, diagonal = parts.border_factor(starts), parts.diagonal
     patches = None
     if stars and len(block):
         home = np.where(levels.is_free, standard // d, -1)

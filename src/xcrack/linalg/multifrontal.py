@@ -124,7 +124,7 @@ class Factor:
         """Solution for right-hand sides `(n,)` or `(n, r)`."""
         return self._unpermute(self._halves(self._permute(b), True, True), b.shape)
 
-    def forward(self, b: Floats) -> Floats:
+    def solve_lower(self, b: Floats) -> Floats:
         """L^-1 P b for right-hand sides `(n, r)`, in permuted order."""
         return self._halves(self._permute(b), True, False)
 
@@ -142,7 +142,7 @@ class Factor:
         rows = np.nonzero(is_touched[part])[0]
         return X[rows], rows
 
-    def backward(self, y: Floats) -> Floats:
+    def solve_upper(self, y: Floats) -> Floats:
         """Solution from its forward half `(n, r)`."""
         return self._unpermute(self._halves(np.array(y), False, True), y.shape)
 

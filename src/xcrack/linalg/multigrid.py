@@ -186,7 +186,7 @@ class GridLevel:
     restrict: RowBlocks
     patches: Patches | None = None
 
-    def solved(self, r: Any) -> Any:
+    def solve_blocks(self, r: Any) -> Any:
         """What the smoother multiplies by the inverse diagonal."""
         return r if self.patches is None else _by_column(self.patches.times, r)
 
@@ -232,13 +232,13 @@ class VCycle:
         level = self.levels[number]
         x, r = np.zeros_like(b), b  # nobody needs b any more
         d = _smooth(level, r, x)
-        level.matrix.added(r, -1, d)
+        level.matrix.add_product(r, -1, d)
         n = level.prolong.shape[0]
         coarse_correction = self._solve_below(number + 1, level.restrict.times(r[:n]))
         correction = np.zeros_like(x)
-        level.prolong.added(correction[:n], 1, coarse_correction)
+        level.prolong.add_product(correction[:n], 1, coarse_correction)
         x += correction
-        level.matrix.added(r, -1, correction)
+        level.matrix.add_product(r, -1, correction)
         _smooth(level, r, x)
         return x
 
@@ -261,10 +261,10 @@ def _smooth(level: GridLevel, r: Any, x: Any) -> Any:
     dtype = np.float32
     d = np.empty_like(x)
     inverse = level.inverse_diagonal if r.ndim == 1 else level.inverse_of_four
-    first_step(inverse, level.solved(r).ravel(), dtype(1 / middle), d.ravel(), x.ravel())
-    level.matrix.added(r, -1, d)
+    first_step(inverse, level.solve_blocks(r).ravel(), dtype(1 / middle), d.ravel(), x.ravel())
+    level.matrix.add_product(r, -1, d)
     scale = dtype(2 * rho / half)
-    smoothed_residual = level.solved(r).ravel()
+    smoothed_residual = level.solve_blocks(r).ravel()
     next_step(inverse, smoothed_residual, dtype(rho / sigma), scale, d.ravel(), x.ravel())
     return d
 
@@ -398,7 +398,7 @@ def _aggregation_levels(
     """
     levels: list[GridLevel] = []
     while A.shape[0] > _COARSEST or not levels:
-        blocks = store_blocks(A) if levels else finest_blocks.single()
+        blocks = store_blocks(A) if levels else finest_blocks.in_single_precision()
         diagonal = _diagonal(A)
         largest = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(
@@ -448,7 +448,7 @@ def _over_linear(
     P = sp.bsr_matrix(
         sp.diags(~is_fixed * 1.0) @ P @ sp.diags(lower.is_free * 1.0), blocksize=(d, d)
     )
-    single_blocks = finest_blocks.single()
+    single_blocks = finest_blocks.in_single_precision()
     top = _level(single_blocks, diagonal, largest_eigenvalue(single_blocks, diagonal), P)
     return (top, *lower.levels), lower.coarse_inverse
 
@@ -469,7 +469,9 @@ def extended_cycle(
     """
     finest_level = levels.levels[0]
     standard = cast(RowBlocks, finest_level.matrix)
-    single_factor = BorderedFactor(standard, A.coupling.single(), A.border_rows.single())
+    single_factor = BorderedFactor(
+        standard, A.coupling.in_single_precision(), A.border_rows.in_single_precision()
+    )
     if patches is None:
         inverse = reciprocal(diagonal).astype(np.float32)
         largest = largest_eigenvalue(single_factor, diagonal)

@@ -130,9 +130,9 @@ class RowBlocks:
 
     def times(self, x: Any) -> Any:
         """A x, in the type of the values; see `added`."""
-        return self.added(np.zeros((self.shape[0], *x.shape[1:]), self.dtype), 1, x)
+        return self.add_product(np.zeros((self.shape[0], *x.shape[1:]), self.dtype), 1, x)
 
-    def added(self, y: Any, scale: float, x: Any) -> Any:
+    def add_product(self, y: Any, scale: float, x: Any) -> Any:
         """Write y + scale A x over y, and return it, for a vector or four `(n, 4)`."""
         if x.ndim == 1:
             from xcrack.linalg.kernels.cycle import product as multiply
@@ -162,7 +162,7 @@ class RowBlocks:
         ends = [0, *np.searchsorted(self.offset, targets), len(self.first_row) - 1]
         return [slice(a, b + 1) for a, b in itertools.pairwise(ends)]
 
-    def single(self) -> "RowBlocks":
+    def in_single_precision(self) -> "RowBlocks":
         """The same matrix in single precision; it shares the pattern."""
         return replace(self, values=lock(self.values.astype(np.float32)))
 
@@ -302,16 +302,16 @@ class BorderedFactor:
 
     def times(self, x: Any) -> Any:
         """A x, in the type of the values; see `RowBlocks.added`."""
-        return self.added(np.zeros_like(x, self.dtype), 1, x)
+        return self.add_product(np.zeros_like(x, self.dtype), 1, x)
 
     def times_all(self, vectors: Sequence[Any]) -> list[Any]:
         """A x of several vectors, four at a time."""
         return in_fours(self.times, vectors)
 
-    def added(self, y: Any, scale: float, x: Any) -> Any:
+    def add_product(self, y: Any, scale: float, x: Any) -> Any:
         """Write y + scale A x over y, and return it; see `RowBlocks.added`."""
         n = self.body_block.shape[0]
-        self.body_block.added(y[:n], scale, x[:n])
-        self.coupling.added(y[:n], scale, x[n:])
-        self.border_rows.added(y[n:], scale, x)
+        self.body_block.add_product(y[:n], scale, x[:n])
+        self.coupling.add_product(y[:n], scale, x[n:])
+        self.border_rows.add_product(y[n:], scale, x)
         return y

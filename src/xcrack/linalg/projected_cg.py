@@ -166,10 +166,10 @@ class _Plane:
     def nearest(self, y: Floats) -> Floats:
         return y - self.lifted @ self.solve(self.rows @ y + self.offset)
 
-    def along(self, z: Floats) -> Floats:
+    def project(self, z: Floats) -> Floats:
         return z - self.lifted @ self.solve(self.rows @ z)
 
-    def carried(self, r: Floats) -> Floats:
+    def pressure_of(self, r: Floats) -> Floats:
         """Multipliers of the part of a residual that pressures carry."""
         return self.solve(self.lifted.T @ r)
 
@@ -225,7 +225,7 @@ class _Descent:
 
     def step(self) -> Iteration[None]:
         z = yield Request.CYCLE, self.r
-        z = z if self.plane is None else self.plane.along(z)
+        z = z if self.plane is None else self.plane.project(z)
         rz = _dot(self.r, z)
         if self.p is None:
             self.p = z
@@ -249,7 +249,7 @@ class _Descent:
     def _goes_on(self, r: Floats) -> None:
         """Take off what pressures carry and what would move the body."""
         if self.plane is not None:
-            correction = self.plane.carried(r)
+            correction = self.plane.pressure_of(r)
             r -= self.plane.rows.T @ correction
             self.carried += correction
         self.r = _without_motions(self.K.null, r)

@@ -683,7 +683,9 @@ class _SetTable:
         keyword = line.keyword
         if len(entries) < 2:
             keyword.refuse("GENERATE needs a first and a last number, and a step if not 1.", number)
-        first, last, *rest = (keyword.whole(entry, number, "a number") for entry in entries[:3])
+        first, last, *rest = (
+            keyword.whole_number(entry, number, "a number") for entry in entries[:3]
+        )
         step = rest[0] if rest else 1
         if not step or last - first > _MOST_MEMBERS * abs(step):
             words = f"GENERATE from {first} to {last} makes too many members: give those there are."
@@ -783,7 +785,7 @@ def _node_rows(keyword: Keyword) -> tuple[list[int], Floats]:
             return table[:, 0].astype(np.int64).tolist(), x
     labels, places = [], []
     for line, entries in keyword.rows:
-        labels.append(keyword.whole(entries[0], line, "the number of a node"))
+        labels.append(keyword.whole_number(entries[0], line, "the number of a node"))
         coordinates = [keyword.number(entry, line, "a coordinate", 0.0) for entry in entries[1:4]]
         places.append([*coordinates, 0.0, 0.0, 0.0][:3])
     return labels, np.array(places, dtype=float).reshape(-1, 3)
@@ -808,7 +810,7 @@ def _element_rows(keyword: Keyword, kind: str) -> list[list[int]]:
         for line, text in keyword.data:
             if not goes_on:
                 labels.append(
-                    [keyword.whole(entries_of(text)[0], line, "the number of an element")]
+                    [keyword.whole_number(entries_of(text)[0], line, "the number of an element")]
                 )
             goes_on = text.rstrip().endswith(",")
         return labels
@@ -820,7 +822,7 @@ def _element_rows(keyword: Keyword, kind: str) -> list[list[int]]:
             numbers += map(int, entries)
         except ValueError:
             for entry in entries:
-                keyword.whole(entry.strip(), line, "the number of a node")
+                keyword.whole_number(entry.strip(), line, "the number of a node")
     if len(numbers) % width:
         keyword.refuse(
             f"{len(numbers)} numbers for elements of {width} each (a number and {width - 1} "

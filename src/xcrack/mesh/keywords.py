@@ -98,7 +98,7 @@ class Keyword:
             self.refuse(f"{text!r:.40} is no finite number: give {what}.", line)
         return value
 
-    def whole(self, text: str, line: int, what: str) -> int:
+    def whole_number(self, text: str, line: int, what: str) -> int:
         """An entry as a whole number."""
         try:
             return int(text)

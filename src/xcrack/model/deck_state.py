@@ -406,7 +406,7 @@ class DeckState:
             self.force[self._force_step < step] = 0.0
         factor = self._factor(line)
         for number, row in keyword.rows:
-            axis = keyword.whole(row[1] if len(row) > 1 else "", number, "a direction") - 1
+            axis = keyword.whole_number(row[1] if len(row) > 1 else "", number, "a direction") - 1
             if axis not in range(6):
                 keyword.refuse(
                     f"direction {axis + 1} is none: give one of 1 to 6.", number, ProblemError
@@ -516,8 +516,8 @@ def _axes(keyword: Keyword, row: list[str], number: int) -> tuple[int, ...]:
     word = row[1].upper() if len(row) > 1 else ""
     if word in _HELD:
         return tuple(_HELD[word])
-    first = keyword.whole(word, number, "a direction, or a word such as ENCASTRE")
-    last = keyword.whole(row[2], number, "a direction") if len(row) > 2 and row[2] else first
+    first = keyword.whole_number(word, number, "a direction, or a word such as ENCASTRE")
+    last = keyword.whole_number(row[2], number, "a direction") if len(row) > 2 and row[2] else first
     if not 1 <= first <= last <= 6:
         keyword.refuse(
             f"directions {first} to {last}: 1 to 3 are displacements, 4 to 6 turns; others are no "

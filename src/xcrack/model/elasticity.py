@@ -311,7 +311,7 @@ class Elasticity:
             return [self.named[0][0]]
         return [self.named[k][0] for k in np.unique(self.set_number[cells]).tolist()]
 
-    def differing(self, material: Isotropic, cells: Ints) -> Ints:
+    def cells_unlike(self, material: Isotropic, cells: Ints) -> Ints:
         """Those of the cells whose stiffness is not everywhere that of a material."""
         tensor = material.tensor(self.mesh.dim)
         numbers = [
@@ -355,7 +355,7 @@ class Elasticity:
         """
         result = np.zeros_like(gradient)
         is_different = np.zeros(len(self.mesh.cells), dtype=bool)
-        is_different[self.differing(material, np.arange(len(is_different)))] = True
+        is_different[self.cells_unlike(material, np.arange(len(is_different)))] = True
         rows = np.nonzero(is_different[cell])[0]
         for n in range(gradient.shape[3] if len(rows) else 0):
             local = np.ascontiguousarray(gradient[rows, :, :, n])

@@ -50,7 +50,7 @@ class CurvedSides:
                 result[rows] = curve(x[rows])
         return result
 
-    def bent(self, x: Floats, facet: Ints) -> Floats:
+    def on_curves(self, x: Floats, facet: Ints) -> Floats:
         """As `bend`, of places alone."""
         return self.bend(x, facet, np.zeros((*x.shape[:2], 1)))[0]
 
@@ -180,7 +180,7 @@ def boundary_lines(mesh: Mesh) -> Floats:
     outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     x = mesh.points[mesh.facets[outer]]
     sides = CurvedSides.of(mesh)
-    return x if sides is None else sides.bent(x, outer)
+    return x if sides is None else sides.on_curves(x, outer)
 
 
 def lattice_parts(corners: int, n: int) -> tuple[Floats, Ints]:

@@ -86,12 +86,14 @@ def _ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iter
     x = space.tips[t].x
     for cells, n, degree in ring_classes(space, x, hollow, outer):
         if not elasticity.is_uniform:
-            cells = np.setdiff1d(cells, elasticity.differing(material_at_tip(solution, t), cells))
+            cells = np.setdiff1d(
+                cells, elasticity.cells_unlike(material_at_tip(solution, t), cells)
+            )
         yield _ring_part(space, cells, n, degree, False)
     if elasticity.is_uniform:
         return
     for cells, n, degree in ring_classes(space, x, 0.0, outer):
-        cells = elasticity.differing(material_at_tip(solution, t), cells)
+        cells = elasticity.cells_unlike(material_at_tip(solution, t), cells)
         yield _ring_part(space, cells, n, degree, True)
 
 

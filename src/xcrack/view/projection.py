@@ -119,7 +119,7 @@ def section_outline(mesh: Mesh, plane: Projection) -> Floats:
     rows = rows[parent]
     lines = np.einsum("kwv,kvd->kwd", bary, mesh.points[facets[rows]])
     if (curved_sides := CurvedSides.of(mesh)) is not None:
-        lines = curved_sides.bent(lines, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows])
+        lines = curved_sides.on_curves(lines, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows])
     return on_plane(lines, plane)
 
 

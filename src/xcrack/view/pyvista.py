@@ -317,7 +317,7 @@ def _left_of(picture: SpaceScene, right_axis: Floats, limit: float) -> SpaceScen
         x = corners.reshape(-1, 3)
         level = x @ right_axis - limit
         parts = (
-            [TriangleSoup.of(number, None).behind(level)]
+            [TriangleSoup.of(number, None).part_behind(level)]
             if v > 2
             else segments_behind(number, level)
         )

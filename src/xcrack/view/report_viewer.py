@@ -200,8 +200,8 @@ def _body(mesh: Mesh) -> list[dict[str, Any]]:
     pairs, facet, is_sharp = boundary_edges(mesh, curved_sides)
     skin, edges = mesh.points[mesh.boundary], mesh.points[pairs[is_sharp]]
     if curved_sides is not None:
-        skin = curved_sides.bent(skin, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
-        edges = curved_sides.bent(edges, facet[is_sharp])
+        skin = curved_sides.on_curves(skin, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
+        edges = curved_sides.on_curves(edges, facet[is_sharp])
     return [
         _layer("body", "triangles", skin, _GREY, 0.25),
         _layer("edges", "lines", edges, _EDGE, 1.0),

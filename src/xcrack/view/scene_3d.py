@@ -162,8 +162,8 @@ def space_scene(
         facet = _on_curve(curved_sides, on)
         at_rest[number] = curved_sides.nearest(at_rest[number], facet[first])
     level = levels(at_rest, plane)
-    parts = [TriangleSoup.of(on.shell, None, on.of_shell).behind(level)]
-    parts.append(TriangleSoup.of(on.lip).behind(level))
+    parts = [TriangleSoup.of(on.shell, None, on.of_shell).part_behind(level)]
+    parts.append(TriangleSoup.of(on.lip).part_behind(level))
     lines = [
         segments_behind(on.outline, level, on.of_outline),
         segments_behind(on.rims, level),
@@ -328,7 +328,7 @@ def _seen_through(
             x, data, _ = curved_sides.bend(x, part.facet, data)
         return x + warp * data
 
-    skin = place_part(TriangleSoup.of(facets, None, outer).behind(level))
+    skin = place_part(TriangleSoup.of(facets, None, outer).part_behind(level))
     faint_lines = [place_part(part) for part in segments_behind(edges, level, facet)]
     no_lines = np.zeros((0, 2, 3))
     outline = np.concatenate([place_part(part) for part in sharp_lines] or [no_lines])

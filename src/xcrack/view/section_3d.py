@@ -61,7 +61,7 @@ class TriangleSoup:
         """Values at the vertices `(k, w, m)` of what is given at points `(n, m)`."""
         return np.einsum("kwv,kvm->kwm", self.share, x[self.number])
 
-    def behind(self, level: Floats | None) -> "TriangleSoup":
+    def part_behind(self, level: Floats | None) -> "TriangleSoup":
         """What is left of triangles behind a plane."""
         if level is None:
             return self

@@ -47,7 +47,13 @@ from xcrack.verification.charting.settings import (
     smallest,
     with_lengths,
 )
-from xcrack.verification.charting.values import K_of_all, Sampled, at_places, most_trusted, plain
+from xcrack.verification.charting.values import (
+    K_of_all,
+    Sampled,
+    at_places,
+    most_trusted,
+    sampled_numbers,
+)
 
 Settings = Sequence[Mapping[str, Any]] | Mapping[str, Mapping[str, Any]]
 Meshes = Sequence[Mesh] | Callable[[float], Mesh]
@@ -224,11 +230,11 @@ def _failure_outcome(
 
 
 def _energies(solutions: Sequence[Solution]) -> Sampled:
-    return plain([solution.energy for solution in solutions])
+    return sampled_numbers([solution.energy for solution in solutions])
 
 
 def _of_user(quantity: Quantity, result: Any) -> Sampled:
-    return plain(call_function(quantity, "the quantity of chart", result))
+    return sampled_numbers(call_function(quantity, "the quantity of chart", result))
 
 
 def _varied(problem: Problem, mesh: Mesh, changes: dict[str, Any]) -> Problem:

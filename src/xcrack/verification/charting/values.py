@@ -73,7 +73,7 @@ def sampled(sifs: Sequence[Sequence[SIF]], best: bool = False) -> Sampled:
     return Sampled(*(np.concatenate(part) for part in (values, points, group, surface)))
 
 
-def plain(values: Any) -> Sampled:
+def sampled_numbers(values: Any) -> Sampled:
     """Values of a quantity of the user's own.
 
     Raises
@@ -239,4 +239,12 @@ def most_trusted(
     return (finest_mesh, best), error
 
 
-__all__ = ["K_of_all", "Sampled", "at_places", "most_trusted", "plain", "remaining", "sampled"]
+__all__ = [
+    "K_of_all",
+    "Sampled",
+    "at_places",
+    "most_trusted",
+    "remaining",
+    "sampled",
+    "sampled_numbers",
+]

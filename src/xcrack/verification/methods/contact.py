@@ -309,7 +309,7 @@ class augmented_lagrangian(Springs):  # noqa: N801
     def pressure_space(self, problem: Problem, model: System, c: int) -> Multipliers:
         """Groups of points, as multipliers have them."""
         kind = problem.numerics.multipliers
-        return multipliers(model.space, c, model.lips[c], kind, model.known.is_fixed)
+        return multipliers(model.space, c, model.lips[c], kind, model.imposed_values.is_fixed)
 
     def rows(self, problem: Problem, model: System, m: Multipliers) -> "Rows":
         """Weak gaps of the groups."""

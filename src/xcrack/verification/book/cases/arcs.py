@@ -11,7 +11,16 @@ from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.scenes_2d import NU, SIDES, E, imposed, l2, on_box, perturbed, turned
+from xcrack.verification.book.scenes_2d import (
+    NU,
+    SIDES,
+    E,
+    impose_on_sides,
+    l2,
+    on_box,
+    perturbed,
+    turn_field,
+)
 from xcrack.verification.exact.arcs import ArcCrack, arc_manufactured
 
 _CENTRE = np.array([-0.9, -0.1])
@@ -27,7 +36,7 @@ def _open(level: int, order: int, degrees: float, stress: tuple[float, float]) -
         perturbed(n, lower=(-0.5, -1.5), upper=(2.5, 1.5)),
         Isotropic(E, NU, plane="strain"),
         [line_crack(np.stack([np.cos(theta), np.sin(theta)], axis=1))],
-        supports=imposed(turned(arc.field, (0.0, 0.0)), SIDES),
+        supports=impose_on_sides(turn_field(arc.field, (0.0, 0.0)), SIDES),
         order=order,
         contact="off",
     )
@@ -43,7 +52,7 @@ def _open(level: int, order: int, degrees: float, stress: tuple[float, float]) -
 
 
 def _closed_arc(level: int, order: int) -> list[Value]:
-    field = turned(lambda x, y: arc_manufactured(x, y, 1.0, E, NU, p0=1.0, p2=0.5), _CENTRE)
+    field = turn_field(lambda x, y: arc_manufactured(x, y, 1.0, E, NU, p0=1.0, p2=0.5), _CENTRE)
     n = 10 * 2**level
     theta = np.linspace(-0.45, 0.6, max(n // 2, 8) + 1)
     points = _CENTRE + np.stack([np.cos(theta), np.sin(theta)], axis=1)
