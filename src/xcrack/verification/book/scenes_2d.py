@@ -48,7 +48,7 @@ def rows(angle: float) -> Floats:
     return np.array([[c, s], [-s, c]])
 
 
-def turn_field(function: Plane, origin: ArrayLike, angle: float = 0.0) -> Field:
+def turned(function: Plane, origin: ArrayLike, angle: float = 0.0) -> Field:
     """Displacement and stress `(n, d, d)` of an exact field placed at an origin and turned."""
     Q, centre = rows(angle), np.asarray(origin, dtype=float)
 
@@ -71,7 +71,7 @@ def tractions(field: Field, names: Sequence[str]) -> list[traction]:
     ]
 
 
-def impose_on_sides(field: Field, names: Sequence[str]) -> list[displacement]:
+def imposed(field: Field, names: Sequence[str]) -> list[displacement]:
     """Exact displacements on the given sets."""
     return [displacement(name, lambda x: field(x)[0]) for name in names]
 
@@ -94,7 +94,7 @@ def on_box(
         mesh,
         Isotropic(E, nu, plane),
         cracks,
-        supports=impose_on_sides(field, sides),
+        supports=imposed(field, sides),
         loads=tractions(field, traction),
         order=order,
         **options,
@@ -118,7 +118,7 @@ def centre_crack(
     **options: Any,
 ) -> tuple[Problem, Field]:
     """Crack [-1, 1], turned, in a square of that half side with the exact field imposed."""
-    field = turn_field(function, origin, angle)
+    field = turned(function, origin, angle)
     mesh = perturbed(n, seed, 0.15, (-half, -half), (half, half))
     crack = line_crack(np.array([[-1.0, 0.0], [1.0, 0.0]]) @ rows(angle) + np.asarray(origin))
     return on_box(mesh, [crack], field, **options), field
@@ -176,13 +176,13 @@ def along(solution: Solution, angle: float = 0.0, origin: Pair = (0.0, 0.0)) -> 
 __all__ = [
     *("NU", "SIDES", "E", "Field", "Pair", "along", "annulus", "centre_crack", "edge_line"),
     *(
-        "impose_on_sides",
+        "imposed",
         "inner_part",
         "l2",
         "on_box",
         "perturbed",
         "rows",
         "tractions",
-        "turn_field",
+        "turned",
     ),
 ]

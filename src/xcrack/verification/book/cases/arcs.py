@@ -15,11 +15,11 @@ from xcrack.verification.book.scenes_2d import (
     NU,
     SIDES,
     E,
-    impose_on_sides,
+    imposed,
     l2,
     on_box,
     perturbed,
-    turn_field,
+    turned,
 )
 from xcrack.verification.exact.arcs import ArcCrack, arc_manufactured
 
@@ -36,7 +36,7 @@ def _open(level: int, order: int, degrees: float, stress: tuple[float, float]) -
         perturbed(n, lower=(-0.5, -1.5), upper=(2.5, 1.5)),
         Isotropic(E, NU, plane="strain"),
         [line_crack(np.stack([np.cos(theta), np.sin(theta)], axis=1))],
-        supports=impose_on_sides(turn_field(arc.field, (0.0, 0.0)), SIDES),
+        supports=imposed(turned(arc.field, (0.0, 0.0)), SIDES),
         order=order,
         contact="off",
     )
@@ -52,7 +52,7 @@ def _open(level: int, order: int, degrees: float, stress: tuple[float, float]) -
 
 
 def _closed_arc(level: int, order: int) -> list[Value]:
-    field = turn_field(lambda x, y: arc_manufactured(x, y, 1.0, E, NU, p0=1.0, p2=0.5), _CENTRE)
+    field = turned(lambda x, y: arc_manufactured(x, y, 1.0, E, NU, p0=1.0, p2=0.5), _CENTRE)
     n = 10 * 2**level
     theta = np.linspace(-0.45, 0.6, max(n // 2, 8) + 1)
     points = _CENTRE + np.stack([np.cos(theta), np.sin(theta)], axis=1)

@@ -20,7 +20,7 @@ from xcrack.verification.book.scenes_2d import (
     l2,
     rows,
     tractions,
-    turn_field,
+    turned,
 )
 from xcrack.verification.exact import closed, plates
 
@@ -33,7 +33,7 @@ def _ring(level: int, order: int) -> list[Value]:
     """Radial crack through the wall of a thick cylinder, pressed by Lamé's hoop stress."""
     n = 6 * 2**level
     p = _OUTER**2 / (_OUTER**2 - _INNER**2)
-    field = turn_field(
+    field = turned(
         lambda x, y: plates.lame_cylinder(x, y, _INNER, _OUTER, 0.0, 1.0, E, NU), (0.0, 0.0)
     )
     direction = rows(0.4)[0]

@@ -14,8 +14,8 @@ from xcrack.verification.book.scenes_2d import (
     SIDES,
     E,
     centre_crack,
-    impose_on_sides,
-    turn_field,
+    imposed,
+    turned,
 )
 from xcrack.verification.exact.fields_2d import griffith
 from xcrack.verification.exact.potentials_2d import Values, uniform_stress
@@ -33,7 +33,7 @@ def _plane(x: Floats, y: Floats, felt: float, shear: float, pressure: float) -> 
 
 def _state(felt: float, shear: float, pressure: float = 1.0) -> list[displacement]:
     plane = partial(_plane, felt=felt, shear=shear, pressure=pressure)
-    return impose_on_sides(turn_field(plane, _ORIGIN, _ANGLE), SIDES)
+    return imposed(turned(plane, _ORIGIN, _ANGLE), SIDES)
 
 
 def _cycle(level: int, order: int) -> list[Value]:

@@ -15,7 +15,7 @@ from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.scenes_2d import NU, SIDES, E, perturbed, rows, turn_field
+from xcrack.verification.book.scenes_2d import NU, SIDES, E, perturbed, rows, turned
 from xcrack.verification.exact import fields_2d, potentials_2d
 
 _SYY, _SXY, _ANGLE = 1.0, 0.5, 0.21
@@ -31,7 +31,7 @@ def _run(
     level: int, order: int, stress: tuple[float, float, float], loads: Sequence[Load]
 ) -> list[Value]:
     """K of Griffith's crack, whose sides have its displacement without that of a uniform stress."""
-    field = turn_field(
+    field = turned(
         lambda x, y: fields_2d.griffith(x, y, 1.0, E, NU, 0.0, _SYY, _SXY), (0, 0), _ANGLE
     )
 

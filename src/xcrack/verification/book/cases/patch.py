@@ -13,7 +13,7 @@ from xcrack.model.loads import displacement
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
 from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.scenes_2d import NU, SIDES, E, on_box, perturbed, rows, turn_field
+from xcrack.verification.book.scenes_2d import NU, SIDES, E, on_box, perturbed, rows, turned
 from xcrack.verification.book.scenes_3d import turn
 from xcrack.verification.exact import fields_3d, potentials_2d
 
@@ -30,9 +30,7 @@ def _deviation(problem: Problem) -> float:
 
 def _any_angle(level: int, order: int) -> list[Value]:
     del level
-    field = turn_field(
-        lambda x, y: potentials_2d.uniform_stress(x, y, -_P, -_P, 0.0, E, NU), (0, 0)
-    )
+    field = turned(lambda x, y: potentials_2d.uniform_stress(x, y, -_P, -_P, 0.0, E, NU), (0, 0))
     values = []
     for k, angle in enumerate((0.3, 1.1, 2.4)):
         ends = np.array([[-0.41, 0.0], [0.37, 0.0]]) @ rows(angle) + [0.02, -0.03]
@@ -47,9 +45,7 @@ def _any_angle(level: int, order: int) -> list[Value]:
 def _any_cut(level: int, order: int) -> list[Value]:
     """A crack parallel to a row of nodes, ever closer to it."""
     del level
-    field = turn_field(
-        lambda x, y: potentials_2d.uniform_stress(x, y, -_P, -_P, 0.0, E, NU), (0, 0)
-    )
+    field = turned(lambda x, y: potentials_2d.uniform_stress(x, y, -_P, -_P, 0.0, E, NU), (0, 0))
     values = []
     for share in (0.5, 1e-2, 1e-6, 1e-12, 0.0):
         y = 0.2 * (1 + share)

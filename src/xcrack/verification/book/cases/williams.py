@@ -9,7 +9,7 @@ from xcrack.model.numerics import Numerics
 from xcrack.output.opening import energy_error
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
-from xcrack.verification.book.scenes_2d import NU, E, edge_line, on_box, perturbed, turn_field
+from xcrack.verification.book.scenes_2d import NU, E, edge_line, on_box, perturbed, turned
 from xcrack.verification.exact import fields_2d
 from xcrack.verification.exact.potentials_2d import Plane
 
@@ -22,7 +22,7 @@ _SOURCE = "leading fields at a tip (Williams, 1957), imposed on a square"
 
 def _run(level: int, order: int, plane: Plane) -> list[Value]:
     n = _CELLS[order] * 2**level
-    field = turn_field(
+    field = turned(
         lambda x, y: fields_2d.williams(x, y, E, NU, _K_I, _K_II, _T, plane=plane), _TIP, _ANGLE
     )
     problem = on_box(
