@@ -11,8 +11,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 import xcrack as xc
+from support import scenes_3d as scenes
 
 ROUND_OFF = 2e-8
+SHIFT = (3.7, -11.3, 0.9)
 STRESS = np.array([[0.2, 0.1, 0.3], [0.1, -0.1, 0.2], [0.3, 0.2, 1.0]])
 STRAIN = 1.3 * STRESS - 0.3 * np.trace(STRESS) * np.eye(3)
 EVEN = np.array([p for p in permutations(range(4)) if np.linalg.det(np.eye(4)[list(p)]) > 0])
@@ -37,23 +39,37 @@ def renumbered(points, cells):
     return points[order], np.argsort(order)[cells][rng.permutation(len(cells))]
 
 
-def solved(crack, order, points, cells, to=None):
-    """K along the front of a crack in a cube that an even strain pulls, one side left free."""
+def solved(crack, order, points, cells, to=None, by=(0.0, 0.0, 0.0)):
+    """K along the front of a crack in a cube that an even strain pulls, one side left free.
+
+    The scene is turned, or mirrored, and then shifted; places of K are as before.
+    """
     to = np.eye(3) if to is None else to
-    points = points @ to.T
+    points = points @ to.T + by
     if np.linalg.det(to) < 0:
         cells = cells[:, [1, 0, 2, 3]]
     boundary = xc.Mesh(points, cells).boundary
-    free = np.abs((points[boundary].mean(axis=1) @ to)[:, 1] + 1) < 1e-9
+    free = np.abs(((points[boundary].mean(axis=1) - by) @ to)[:, 1] + 1) < 1e-9
     mesh = xc.Mesh(points, cells, {"held": boundary[~free]})
-    support = xc.displacement("held", lambda x: (x @ to) @ STRAIN @ to.T)
+    support = xc.displacement("held", lambda x: ((x - by) @ to) @ STRAIN @ to.T)
     faces = crack.faces if np.linalg.det(to) > 0 else crack.faces[:, [0, 2, 1]]
-    placed = xc.surface_crack(crack.points @ to.T, faces)
+    placed = xc.surface_crack(crack.points @ to.T + by, faces)
     problem = xc.Problem(
         mesh, xc.Isotropic(1.0, 0.3), [placed], supports=[support], order=order, contact="off"
     )
     sif = xc.stress_intensity(xc.solve(problem))
-    return sif.x @ to, sif.K
+    return (sif.x - by) @ to, sif.K
+
+
+def differ(one, other, is_mirrored):
+    """Largest difference of K at the same places, over the largest K."""
+    (x, K), (x_wanted, wanted) = one, other
+    away, at = cKDTree(x).query(x_wanted)
+    assert away.max() < 1e-11
+    K = K[at]
+    if is_mirrored:  # the sense of shear follows the frame
+        K, wanted = np.abs(K), np.abs(wanted)
+    return np.abs(K - wanted).max() / np.abs(wanted).max()
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +89,7 @@ def reference():
         *(pytest.param(each, marks=pytest.mark.slow) for each in ("corners", "numbers")),
         "turned",
         "mirrored",
+        pytest.param("shifted", marks=pytest.mark.slow),
     ],
 )
 def test_K(reference, crack, order, change):
@@ -86,11 +103,33 @@ def test_K(reference, crack, order, change):
         points, cells = renumbered(points, cells)
     if change == "turned":
         to = turn()
-    x, K = solved(crack, order, points, cells, to)
-    x_wanted, wanted = reference[crack, order]
-    away, at = cKDTree(x).query(x_wanted)
-    K = K[at]
-    if change == "mirrored":  # the sense of shear follows the frame
-        K, wanted = np.abs(K), np.abs(wanted)
-    assert away.max() < 1e-12
-    assert np.abs(K - wanted).max() <= ROUND_OFF * np.abs(wanted).max()
+    by = SHIFT if change == "shifted" else (0.0, 0.0, 0.0)
+    K = solved(crack, order, points, cells, to, by)
+    assert differ(K, reference[crack, order], change == "mirrored") <= ROUND_OFF
+
+
+def drawn(rng):
+    """A penny or ellipse inside or at the free side; along mesh planes one time in four."""
+    normal = np.eye(3)[2] if rng.random() < 0.25 else rng.normal(size=3)
+    along = np.cross(normal, rng.normal(size=3))
+    a = rng.uniform(0.45, 0.6)
+    b = a * rng.uniform(0.7, 1.0)
+    at = rng.uniform(-0.05, 0.05, 3) - (0.0, rng.choice([0.0, 1.0]), 0.0)
+    return xc.elliptic_crack(at, normal, along, a, b)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("seed", range(7301, 7309))
+def test_K_of_drawn_scenes(seed, order):
+    """All at once: turned and mirrored, shifted, renumbered, corners in another order."""
+    rng = np.random.default_rng(seed)
+    crack, n = drawn(rng), int(rng.integers(5, 8))
+    mesh = scenes.perturbed(n, seed) if rng.random() < 0.5 else xc.box((-1,) * 3, (1,) * 3, n)
+    to = turn() @ np.diag([1.0, 1.0, rng.choice([-1.0, 1.0])])
+    points, cells = renumbered(mesh.points, corners_permuted(mesh.cells))
+    one = solved(crack, order, points, cells, to, SHIFT)
+    other = solved(crack, order, mesh.points, mesh.cells)
+    off = differ(one, other, np.linalg.det(to) < 0)
+    print(f"\n{seed}, order {order}: {off:.1e}")
+    assert off <= 1e-6

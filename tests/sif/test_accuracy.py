@@ -232,3 +232,49 @@ def test_adapt_refines_where_a_front_bends():
     ends = crack.points[np.abs(crack.points[:, 0] - 0.01) > 0.599]
     cells = np.unique(locate(first, ends)[0])
     assert leg_size(first, cells) <= 0.3**2 / 0.6 / 2
+
+
+def pulled_edge(n, depth, order):
+    """A plate of thickness .5 with an edge crack, n cells across its width of 1."""
+    mesh = xc.box((0, 0, -1.5), (1, 0.5, 1.5), (n, n // 2, 3 * n))
+    ends = [(-0.5, -0.5), (depth, -0.5), (depth, 1.0), (-0.5, 1.0)]
+    loads = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+    crack = xc.plane_crack([(x, y, 0.011) for x, y in ends])
+    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=loads, order=order)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("n", "depth", "warns"), [(8, 0.4, True), (12, 0.3, True), (16, 0.4, False)]
+)
+def test_order_1_says_that_K_in_space_is_low(n, depth, warns):
+    """Against order 2 on the same mesh, which is within 0.2 % there; above five cells 2 %."""
+    words, low = messages(pulled_edge(n, depth, 1), "order 1")
+    none, sif = messages(pulled_edge(n, depth, 2), "order 1")
+    inner = ~sif.at_surface
+    error = (low.K_I[inner] / sif.K_I[inner]).mean() - 1
+    assert bool(words) == warns
+    assert not none
+    assert -0.05 < error < (-0.01 if warns else 0.0)
+    if not warns:
+        assert error > -0.02
+
+
+@pytest.mark.slow
+def test_bars_at_order_1_come_from_order_2():
+    """With them the best K is that, and there is nothing to warn of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        xc.stress_intensity(xc.solve(pulled_edge(8, 0.4, 1)), error=True)
+    assert not [w for w in caught if "order 1:" in str(w.message)]
+
+
+def test_order_1_is_named_before_and_after_a_solution():
+    problem = pulled_edge(8, 0.4, 1)
+    planned = xc.plan(problem)["order 1"]
+    assert planned.used
+    assert "crack 0: 3." in planned.reason
+    words, _ = messages(problem, "order 1: crack 0 is 3.2 cells deep")
+    assert len(words) == 1
+    with pytest.raises(xc.ProblemError, match="no ingredient"):
+        xc.plan(replace(problem, order=2))["order 1"]

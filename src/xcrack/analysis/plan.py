@@ -11,9 +11,10 @@ from xcrack.base.errors import ProblemError, SizeError
 from xcrack.base.machine import free_memory
 from xcrack.base.markup import element
 from xcrack.crack.crack import Crack, crack_length
-from xcrack.crack.measures import area_inside, front_length_inside
+from xcrack.crack.measures import area_inside, cells_deep, front_length_inside
 from xcrack.crack.stations import short_fronts
 from xcrack.fem.enrichment import reach_of_tips
+from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import leg_sizes
 from xcrack.model.problem import Problem, ProblemArgument
@@ -317,7 +318,8 @@ def plan(problem: ProblemArgument) -> Report:
     >>> print(xc.plan(xc.Problem(mesh, steel))["tip functions"])
     tip functions           left out  no cracks
     """
-    return Report(ingredients_of(problem), {}, size_forecast=forecast_of(problem))
+    rows = (*ingredients_of(problem), *_order(problem))
+    return Report(rows, {}, size_forecast=forecast_of(problem))
 
 
 def ingredients_of(problem: Problem) -> tuple[Ingredient, ...]:
@@ -402,6 +404,28 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     )
     reason = f"{sum(n_tips)} {_ENDS[problem.mesh.dim]}, {what_each}, {reach}"
     return Ingredient("tip functions", True, reason + (f"; left out: {absence}" if absence else ""))
+
+
+# Barycentric coordinates of points that are even on a triangle.
+_ON_FACE = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)]) / 8
+
+
+def _order(problem: Problem) -> list[Ingredient]:
+    """What order 1 does to K in 3D; nothing elsewhere."""
+    deep = {}
+    if problem.mesh.dim == 3 and problem.order == 1:
+        body = Body.of(problem.mesh)
+        for c, crack in enumerate(problem.placed):
+            x = (_ON_FACE @ crack.points[crack.faces]).reshape(-1, 3)
+            x = x[body.contains(x)]
+            if crack.fronts and len(x):
+                front = crack.points[np.concatenate(crack.fronts)]
+                deep[c] = cells_deep(x, front, problem.mesh)
+    if not deep:
+        return []
+    depths = ", ".join(f"crack {c}: {value:.2g} cells deep" for c, value in deep.items())
+    why = f"{depths}; K is 1 to 5 % too low below five cells, order=2 within 0.5 %"
+    return [Ingredient("order 1", True, why)]
 
 
 def _friction(problem: Problem) -> list[Ingredient]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from xcrack.base.arguments import Part, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, ranges
@@ -15,6 +16,7 @@ from xcrack.crack.stations import place_crack
 from xcrack.mesh.distances import distance_to_simplices, signed_in
 from xcrack.mesh.locate import Body, parts_inside
 from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.simplex import leg_sizes
 
 # Length of a 2D crack in the body.
 
@@ -209,6 +211,30 @@ def crack_size(cracks: Sequence[Crack], c: int, mesh: Mesh) -> float:
     if crack.fronts is None:
         return length_inside(crack, mesh)
     return surface_size(crack, mesh, body_of(cracks, c, Body.of(mesh)))
+
+
+_AROUND = 1.5  # depths of a crack, up to which cells around its front bear its stress
+_SAMPLES = 10_000  # points and cells that are looked at, at most
+
+
+def cells_deep(x: Floats, front: Floats, mesh: Mesh) -> float:
+    """Depth of a crack in 3D over the mean size of the cells around its front.
+
+    Parameters
+    ----------
+    x, front : (n, 3) and (m, 3) arrays, length
+        Points on its faces in the body, and along its fronts.
+    mesh : Mesh
+    """
+    tree = cKDTree(front)
+    depth = float(tree.query(x[:: len(x) // _SAMPLES + 1])[0].max())
+    cells = np.arange(0, len(mesh.cells), len(mesh.cells) // _SAMPLES + 1)
+    centre = mesh.points[mesh.cells[cells]].mean(axis=1)
+    distance = tree.query(centre, distance_upper_bound=_AROUND * depth)[0]
+    cells = cells[np.isfinite(distance)]
+    if not len(cells):
+        return 0.0
+    return depth / float(np.average(leg_sizes(mesh, cells), weights=mesh.volume[cells]))
 
 
 def halved_triangles(piece: Floats, side: Floats) -> Floats:

@@ -13,6 +13,7 @@ from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.machine import threads
 from xcrack.model.material import Material
+from xcrack.sif.accuracy import warn_of_order
 from xcrack.sif.domain_2d import tip_intensities
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.error import with_bars
@@ -54,7 +55,7 @@ def stress_intensity(solution: Solution, crack: _CrackNumber = 0, error: _Bars =
         A domain with too little room for small errors; two domains that differ by more than 1 % of
         K at a tip, or by 5 % of the largest K in the mean of a front; a contact zone at a tip or
         front that is shorter than two cells; a front too short for K, or whose radius of curvature
-        is below two cells.
+        is below two cells; a crack in 3D that is less than five cells of order 1 deep.
     """
     if not isinstance(solution, Solution):
         hint = ""
@@ -128,9 +129,10 @@ def stress_intensities(
         return with_bars(solutions, result, crack, error)
     if error is None:
         error = any(s.factored is not None for s in solutions)
-    elif not error:
-        return result
-    return with_bars(solutions, result, crack) if error else result
+    if error:
+        return with_bars(solutions, result, crack)
+    warn_of_order(live[0], crack)
+    return result
 
 
 def _checked_solutions(solutions: Any) -> list[Solution]:
