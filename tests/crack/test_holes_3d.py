@@ -192,6 +192,46 @@ def test_small_holes_and_holes_at_an_angle(tmp_path, hole, section):
     assert area_inside(crack, mesh) - before == pytest.approx(gained, rel=0.01)
 
 
+@pytest.mark.parametrize("ligament", [0.015, *slow(0.004, 0.035)])
+def test_a_front_passes_under_the_bottom_of_a_hole(tmp_path, ligament):
+    """Of .04 to .35 cells above it: one front, all of the area, and K has a value there."""
+    mesh = block(tmp_path / "hole.msh", (-0.4, 0, 0.011 + ligament, 0, 0, 1, 0.14), facets=8)
+    crack = place_surface(through_crack(-0.7), mesh)
+    before = area_inside(crack, mesh)
+    for step in range(1, 8):
+        crack = grown(crack, mesh, 0.1)
+        assert len(crack.fronts) == 1
+        gained = area_inside(crack, mesh) - before
+        assert gained == pytest.approx(2 * HALF * 0.1 * step, rel=0.01)
+        if step == 3:
+            under = crack
+    ends = [xc.displacement("top", (0.0, 0.0, 1e-3)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
+    problem = xc.Problem(mesh, xc.Isotropic(210e3, 0.3), [under], supports=ends, order=1)
+    sif = xc.stress_intensity(xc.solve(problem))
+    # Under the hole little is pulled, which is more just beside it.
+    below, beside = (np.abs(sif.x[:, 1]) < 0.1), (np.abs(sif.x[:, 1]) > 0.34)
+    far = sif.K_I[np.abs(sif.x[:, 1]) > 0.5].mean()
+    assert 0 < sif.K_I[below].min()
+    assert 0.2 * far < sif.K_I[below].mean() < 0.8 * far
+    assert sif.K_I[beside] == pytest.approx(far, rel=0.25)
+
+
+@pytest.mark.slow
+def test_points_that_stay_in_the_middle_of_a_side_keep_their_order(tmp_path):
+    """A skew blind hole whose wall and bottom the front meets at once: refused in words."""
+    hole = (-0.35809569, -0.035, -0.07393365, -0.92658734, -1.13745398, 0.31246489, 0.16069562)
+    mesh = block(tmp_path / "hole.msh", hole, facets=8)
+    crack = grown(place_surface(through_crack(-0.85), mesh), mesh, 0.1)
+
+    def to_the_other_side():
+        again = crack
+        for _ in range(10):
+            again = grown(again, mesh, 0.1)
+
+    with pytest.raises(xc.GeometryError, match=r"ligament between them|folds"):
+        to_the_other_side()
+
+
 def test_a_front_that_has_just_come_round_a_hole_is_whole(tmp_path):
     """A chord of it cuts off 0.01 of the wall, as facets do: nothing leaves the body there."""
     mesh = block(tmp_path / "hole.msh", (-0.45, 0.3, -0.5, 1.0, 0.1), facets=8)

@@ -94,8 +94,13 @@ def _still_at_vertices(front: FrontChain, vertex: Ints) -> FrontChain:
     between = front.is_at_rest & ~np.isin(np.arange(len(front.is_at_rest)), vertex)
     if not between.any():
         return front
-    rows = np.nonzero(between)[0]
-    beside = vertex[np.searchsorted(vertex, rows) - 1]
+    rows, n = np.nonzero(between)[0], len(between)
+    beside = np.zeros(n, dtype=np.int64)
+    for run in runs_of(between) if front.is_closed else open_runs(between):
+        # What moves beside them stays between its neighbours, or the front would turn back.
+        before, after = (run[0] - 1) % n, (run[-1] + 1) % n
+        beside[run] = after if after in vertex and before not in vertex else before
+    beside = beside[rows]
     owner, still, stop = np.array(front.owner), np.array(front.is_at_rest), np.array(front.stop)
     remains = np.ones(len(front.x), dtype=bool)
     remains[owner[rows]] = False

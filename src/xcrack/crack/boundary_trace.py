@@ -183,6 +183,23 @@ def behind_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body)
     return result
 
 
+def under_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body) -> Bools:
+    """Sides of what was front that pass the bottom of a hole within half a cell `(m,)`.
+
+    The boundary is beside them, not ahead: a cell farther on they still are in the body.
+    """
+    result = np.zeros(len(outline.loop), dtype=bool)
+    x = points[outline.loop]
+    middle = (x + np.roll(x, -1, axis=0)) / 2
+    outward, _ = _outward_directions(points, faces, outline.loop)
+    for run in runs_of(~outline.is_inside):
+        if len(run) < len(x) and outline.candidate[run].all():
+            ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward[run]
+            depth = body.depth(np.concatenate([middle[run], ahead]))[0]
+            result[run] = (depth < 0).all()
+    return result
+
+
 def _across_hole(depth: Floats, size: Floats) -> tuple[int, int]:
     """How far the fronts on both sides of a hole go on into it along their outline.
 

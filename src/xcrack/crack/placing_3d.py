@@ -16,6 +16,7 @@ from xcrack.crack.boundary_trace import (
     behind_holes,
     open_fronts,
     runs_of,
+    under_holes,
 )
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions_3d import (
@@ -439,6 +440,8 @@ def _placed_crack(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
         if not first_time and not crack.ends_on and not inside.all():
             outline = TraceOutline(loop, number >= 0, inside, first_time)
             inside = inside | behind_holes(points, faces, outline, body)
+            outline = TraceOutline(loop, number >= 0, inside, first_time)
+            inside = inside | under_holes(points, faces, outline, body)
         if inside.all():
             fronts.append((int(number[0]), np.append(loop, loop[0])))
             continue
