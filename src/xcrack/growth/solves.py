@@ -4,9 +4,9 @@
 other, so that a change of the one that drives is no event.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
@@ -125,14 +125,6 @@ class SolveHistory:
         return np.asarray(angle)
 
 
-def angles_at(solves: SolveHistory, angle: Floats, s: Floats) -> Floats:
-    """Angles at `s` (q,), by bend √s and a polynomial through those of all solves: `(q, n)`."""
-    nodes = np.repeat(solves.sigma[:, None], angle.shape[1], axis=1)
-    x = np.repeat(s[:, None], angle.shape[1], axis=1)
-    smooth = lagrange(nodes, angle - solves.bend * np.sqrt(nodes), x)
-    return np.asarray(smooth + solves.bend * np.sqrt(x))
-
-
 def rates_at(solves: SolveHistory, s: Floats, threshold: float = 0.0) -> Floats:
     """Rates at `s` (q,) by all solves: `(q, n)`, length/cycle.
 
@@ -212,14 +204,26 @@ def _lines(nodes: Floats, values: Floats, x: Floats) -> Floats:
 
 def lagrange(nodes: Floats, values: Floats, x: Floats) -> Floats:
     """Polynomials through values `(k, n)` at nodes `(k, n)`, at `x` (q, n): `(q, n)`."""
-    result = np.zeros(x.shape)
+    return _sum(lagrange_shares(nodes, x), values)
+
+
+def lagrange_shares(nodes: Floats, x: Floats) -> list[Floats]:
+    """Shares of the values at k nodes in the polynomials through them, at `x`, one array a node."""
+    shares = []
     for j in range(len(nodes)):
-        weight: Any = 1.0
+        share = np.ones(x.shape)
         for i in range(len(nodes)):
             if i != j:
-                weight = weight * ((x - nodes[i]) / (nodes[j] - nodes[i]))
-        result += weight * values[j]
-    return result
+                share = share * ((x - nodes[i]) / (nodes[j] - nodes[i]))
+        shares.append(share)
+    return shares
+
+
+def _sum(shares: Sequence[Floats], values: Floats) -> Floats:
+    total = shares[0] * values[0]
+    for share, value in zip(shares[1:], values[1:], strict=True):
+        total = total + share * value
+    return total
 
 
 def bisected_length(
@@ -269,6 +273,21 @@ class Growth:
 
 
 @dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Points `s` (q,) in a piece of σ, and what is counted there.
+
+    Their weights `(q,)`, and dx/dσ of each path `(q, n)`: with these the arcs `(n,)` and the cycles
+    of the whole piece.
+    """
+
+    s: Floats
+    weight: Floats
+    share: Floats
+    arc: Floats
+    cycles: float
+
+
+@dataclass(frozen=True, eq=False)
 class Stretch:
     """A piece of σ over which ends grow as some solves have it.
 
@@ -296,19 +315,30 @@ class Stretch:
 
     def arcs(self, length: float | None = None) -> tuple[Floats, float]:
         """Lengths of the paths `(n,)`, and cycles, over all of it or a first part."""
-        length = self.length if length is None else length
-        if self.marched is not None:
-            return self.marched.until(length)
-        share, per_cycle = self._shares(self.start + length * _POINTS)
-        return length * _WEIGHTS @ share, float(length * _WEIGHTS @ per_cycle)
+        pieces = self._whole if length is None else self._up_to(length)
+        return pieces.arc, pieces.cycles
 
-    def _shares(self, s: Floats) -> tuple[Floats, Floats]:
-        """dx/dσ of each path `(q, n)`, and dN/dσ `(q,)`, where anything grows."""
+    @cached_property
+    def _whole(self) -> "_Pieces":
+        return self._up_to(self.length)
+
+    def _up_to(self, length: float) -> "_Pieces":
+        if self.marched is not None:
+            inside = self.marched.sigma < length
+            arc, cycles = self.marched.until(length)
+            sigma = np.append(self.marched.sigma[inside], length)
+            share = np.diff(np.vstack([self.marched.arc[inside], arc]), axis=0)
+            s = self.start + 0.5 * (sigma[1:] + sigma[:-1])
+            return _Pieces(s, np.ones(len(share)), share, arc, cycles)
+        s, weight = self.start + length * _POINTS, length * _WEIGHTS
         rate = rates_at(self.solves, s, self.threshold)
         largest = rate.max(axis=1, initial=0.0)
         grows = largest > 0
         safe = np.where(grows, largest, 1.0)
-        return np.where(grows[:, None], rate / safe[:, None], 0.0), np.where(grows, 1 / safe, 0.0)
+        share = np.where(grows[:, None], rate / safe[:, None], 0.0)
+        return _Pieces(
+            s, weight, share, weight @ share, float(weight @ np.where(grows, 1 / safe, 0.0))
+        )
 
     def growth(self, frame: Floats, angle: Floats, length: float | None = None) -> Growth:
         """Growth in the directions of the solves, over all of it or a first part.
@@ -322,24 +352,17 @@ class Stretch:
 
         Notes
         -----
-        dx_i/dσ = r_i / max_j r_j (cos θ_i t + sin θ_i n), dN/dσ = 1 / max_j r_j.
+        dx_i/dσ = r_i / max_j r_j (cos θ_i t + sin θ_i n), dN/dσ = 1 / max_j r_j. θ is bend √σ and a
+        polynomial through the angles of all solves.
         """
-        length = self.length if length is None else length
-        if self.marched is None:
-            s, weight = self.start + length * _POINTS, length * _WEIGHTS
-            share, per_cycle = self._shares(s)
-            arc, cycles = weight @ share, float(weight @ per_cycle)
-        else:
-            inside = self.marched.sigma < length
-            arc, cycles = self.marched.until(length)
-            sigma = np.append(self.marched.sigma[inside], length)
-            share = np.diff(np.vstack([self.marched.arc[inside], arc]), axis=0)
-            weight = np.ones(len(share))
-            s = self.start + 0.5 * (sigma[1:] + sigma[:-1])
-        theta = angles_at(self.solves, angle, s)
-        along, across = (weight @ (share * f(theta)) for f in (np.cos, np.sin))
+        pieces = self._whole if length is None else self._up_to(length)
+        solves, s = self.solves, pieces.s[:, None]
+        root = np.sqrt(solves.sigma[:, None])
+        shares = lagrange_shares(solves.sigma, s)
+        theta = _sum(shares, angle - solves.bend * root) + solves.bend * np.sqrt(s)
+        along, across = (pieces.weight @ (pieces.share * f(theta)) for f in (np.cos, np.sin))
         move = along[:, None] * frame[:, 0] + across[:, None] * frame[:, 1]
-        return Growth(move, arc, cycles)
+        return Growth(move, pieces.arc, pieces.cycles)
 
     def length_of_cycles(self, cycles: float) -> float:
         """First part that takes a number of cycles, at most all of it, length."""
@@ -397,7 +420,6 @@ __all__ = [
     "Growth",
     "SolveHistory",
     "Stretch",
-    "angles_at",
     "bisected_length",
     "lagrange",
     "rates_at",

@@ -619,9 +619,10 @@ def _corrected_points(
     except GeometryError:  # which the predicted cracks are free of
         x, cracks, moves = stations.x + plan.move, list(rates.cracks), plan.moves
     gap = x - (stations.x + plan.move)
-    by_places = _places(rule, last, solves, frame, gap)
+    spans = _spans(rule, last, stretch)
+    by_places = _places(rule, last, solves, spans, frame, gap)
     known, newest = by_places.known, by_places.newest
-    cycles, of_life = _cycles(rule, last, solves, growth)
+    cycles, of_life = _cycles(rule, last, spans, growth)
     lag = _OF_LENGTH * by_places.ahead / solves.scale
     behind = error.behind + float(lag[0].max(initial=0.0))
     # What an end lags behind by after this step counts in all cycles that follow.
@@ -698,6 +699,42 @@ def _room(
 
 
 @dataclass(frozen=True, eq=False)
+class _Spans:
+    """A corrected step, and the one before, as several polynomials through solves have them.
+
+    Attributes
+    ----------
+    curve, line : Stretch
+        The step by all solves that are known, and by the last two.
+    before : tuple of Stretch
+        The step before by the last two solves then, by all that were known then, and by those of
+        now; none behind a first step, nor where retardation leaves its error unknown.
+    """
+
+    curve: Stretch
+    line: Stretch
+    before: tuple[Stretch, ...] = ()
+
+
+def _spans(rule: GrowthRule, last: Step, curve: Stretch) -> _Spans:
+    solves, old = curve.solves, solves_of(last)[1]
+    if old.n_solves == 1:
+        return _Spans(curve, curve)
+    line = stretch_of(rule, solves.last(2), curve.start, curve.length, last.zones)
+    if old.n_solves > 2 and last.zones is not None:
+        return _Spans(curve, line)
+    begin, end = old.sigma[-2:].tolist()
+
+    def over(each: SolveHistory) -> Stretch:
+        return stretch_of(rule, each, begin, end - begin, last.earlier_zones)
+
+    then = over(old)
+    return _Spans(
+        curve, line, (then if old.n_solves == 2 else over(old.last(2)), then, over(solves))
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class _PlacesError:
     """Estimated errors of the tips by a step, in two parts of the errors so far.
 
@@ -718,9 +755,9 @@ class _PlacesError:
 
 
 def _places(
-    rule: GrowthRule, last: Step, solves: SolveHistory, frame: Floats, gap: Floats
+    rule: GrowthRule, last: Step, solves: SolveHistory, spans: _Spans, frame: Floats, gap: Floats
 ) -> _PlacesError:
-    """Estimated errors of the tips by a corrected step.
+    """Estimated errors of the tips by a corrected step; `solves` have its corrected directions.
 
     Notes
     -----
@@ -739,17 +776,14 @@ def _places(
     if old.n_solves == 1:
         return _PlacesError(by_gap, none, by_gap, np.stack([arc, none]))
 
-    def moves(each: SolveHistory, k: int) -> Floats:
-        begins, ends = float(solves.sigma[k - 1]), float(solves.sigma[k])
-        stretch = Stretch(each, begins, ends - begins, rule.threshold)
-        return stretch.growth(frame, each.angles(frame)).move
-
-    now, before = (
-        moves(solves, k) - moves(each, k) for k, each in ((-1, solves.last(2)), (-2, old))
-    )
+    angle, old_angle = solves.angles(frame), old.angles(frame)
+    now = spans.curve.growth(frame, angle).move - spans.line.growth(frame, angle[-2:]).move
+    line, then, new = spans.before
+    move = then.growth(frame, old_angle).move
+    before = new.growth(frame, angle).move - move
     ratio, move_length = np.ones(len(size)), np.linalg.norm(before, axis=1)
     if old.n_solves > 2:
-        was = np.linalg.norm(moves(old, -2) - moves(old.last(2), -2), axis=1)
+        was = np.linalg.norm(move - line.growth(frame, old_angle[-2:]).move, axis=1)
         longer = plan.length / float(solves.sigma[-2] - solves.sigma[-3])
         ratio = np.divide(longer * move_length, was, out=ratio, where=was > 0)
         ratio = np.clip(ratio, *_RATIOS_OF_PLACE)
@@ -773,7 +807,7 @@ class _CyclesError:
 
 
 def _cycles(
-    rule: GrowthRule, last: Step, solves: SolveHistory, growth: Growth
+    rule: GrowthRule, last: Step, spans: _Spans, growth: Growth
 ) -> tuple[float, _CyclesError]:
     """Cycles of a corrected step, and their estimated error."""
     plan, old, share = plan_of(last), solves_of(last)[1], share_left(rule)
@@ -782,23 +816,19 @@ def _cycles(
         # The parabola of the next step mends it: of that, a square is left.
         rest = _MENDED * share * off**2 / growth.cycles if growth.cycles > 0 else 0.0
         return growth.cycles, _CyclesError(rest, 0.0, _FIRST * share * off)
-    line = stretch_of(rule, solves.last(2), plan.sigma, plan.length, last.zones).arcs()[1]
-    line_error = share * abs(growth.cycles - line)
+    line_error = share * abs(growth.cycles - spans.line.arcs()[1])
     if old.n_solves > 2:
-        return growth.cycles, _better_known(rule, last, solves, line_error)
+        return growth.cycles, _better_known(rule, last, spans, line_error)
     if old.sigma[0] > 0:  # the step before has passed an interface
         return growth.cycles, _CyclesError(line_error, 0.0, line_error)
     # The second step: the parabola tells what the first one, along a line, was off.
-    span, first = float(old.sigma[1] - old.sigma[0]), float(old.sigma[0])
-    line, curve = (
-        stretch_of(rule, each, first, span, last.earlier_zones).arcs()[1] for each in (old, solves)
-    )
+    line, curve = (span.arcs()[1] for span in spans.before[1:])
     both = _RATIO_OF_FIRST * (line_error + share * abs(curve - line))
     return growth.cycles + curve - line, _CyclesError(_OF_SECOND * line_error, 0.0, both)
 
 
 def _better_known(
-    rule: GrowthRule, last: Step, solves: SolveHistory, line_error: float
+    rule: GrowthRule, last: Step, spans: _Spans, line_error: float
 ) -> _CyclesError:
     """Errors of the cycles of a step behind the second.
 
@@ -810,18 +840,18 @@ def _better_known(
     if last.zones is not None:
         return _CyclesError(line_error, line_error + before, 0.0)
 
-    def cycles(each: SolveHistory, k: int) -> float:
-        begins, ends = float(old.sigma[k]), float(old.sigma[k + 1])
-        return Stretch(each, begins, ends - begins, rule.threshold).arcs()[1]
-
-    was = share_left(rule) * abs(cycles(old, 1) - cycles(old.last(2), 1))
-    now = abs(cycles(old, 1) - cycles(solves, 1))
+    share = share_left(rule)
+    line, then, new = (span.arcs()[1] for span in spans.before)
+    was, now = share * abs(then - line), abs(then - new)
     longer = plan_of(last).length / float(old.sigma[2] - old.sigma[1])
     newest = line_error * (float(np.clip(longer * now / was, *_RATIOS)) if was > 0 else 1.0)
     if old.sigma[0] == 0:  # the first step of all is spanned by one parabola: the next is prolonged
-        was = abs(cycles(old, 0) - cycles(old.first(2), 0))
-        prolonged = abs(cycles(old, 0) - cycles(solves, 0))
-        now += min(_RATIO_OF_PROLONGED * prolonged, _RATIO_OF_FIRST * share_left(rule) * was)
+        line, then, new = (
+            Stretch(each, 0.0, float(old.sigma[1]), rule.threshold).arcs()[1]
+            for each in (old.first(2), old, spans.curve.solves)
+        )
+        prolonged, was = _RATIO_OF_PROLONGED * abs(then - new), abs(then - line)
+        now += min(prolonged, _RATIO_OF_FIRST * share * was)
     return _CyclesError(newest, now, newest)
 
 
