@@ -3,6 +3,7 @@
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING
 from functools import cache
 from math import isfinite
 from numbers import Real
@@ -331,6 +332,25 @@ def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -
     if items is None:
         raise error(f"{what} = {value_text(value)}: give a list.")
     return tuple(items)
+
+
+def sound(kind: type[T], **fields: Any) -> T:
+    """A frozen dataclass of fields that are sound by their making: none is checked.
+
+    Parameters
+    ----------
+    kind : dataclass
+    **fields
+        In the form in which it keeps them; others have their defaults.
+    """
+    result: T = object.__new__(kind)
+    values = vars(result)
+    for name, part in kind.__dataclass_fields__.items():  # type: ignore[attr-defined]
+        if name in fields:
+            values[name] = fields[name]
+        else:
+            values[name] = part.default if part.default is not MISSING else part.default_factory()
+    return result
 
 
 def sound_copy(value: T, **fields: Any) -> T:

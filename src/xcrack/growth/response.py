@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import entries, flag, number, numbers, value_text
+from xcrack.base.checks import entries, flag, number, numbers, sound, sound_copy, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem, check_problem
@@ -207,12 +207,11 @@ def respond(
         problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
     )
     handed_on = solved[0].reuse
+    by_crack = [stress_intensities(solved, c, bars) for c in range(len(problem.cracks))]
     light = handed_on.without_factor()
-    solutions = [replace(solution, reuse=light) for solution in solved]
-    by_crack = [stress_intensities(solutions, c, bars) for c in range(len(problem.cracks))]
-    solutions = [replace(solution, factored=None) for solution in solutions]
+    solutions = tuple(sound_copy(each, reuse=light, factored=None) for each in solved)
     sif = tuple(zip(*by_crack, strict=True))
-    return Response(tuple(states), sif, tuple(solutions), handed_on)
+    return sound(Response, states=states, sif=sif, solutions=solutions, reuse=handed_on)
 
 
 def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> Response:

@@ -7,7 +7,7 @@ from typing import Unpack
 
 import numpy as np
 
-from xcrack.base.checks import sound_copy
+from xcrack.base.checks import sound, sound_copy
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.measures import crack_size
 from xcrack.crack.meetings import LEAST
@@ -506,10 +506,7 @@ def _step_after(
 
 def _scene(rule: GrowthRule, last: Step) -> Problem:
     """The scene after the plan of a step, with the radius of the first."""
-    numerics, radius = rule.problem.numerics, run_state(last).radius
-    if radius is not None:
-        numerics = replace(numerics, radius=radius)
-    problem = replace(rule.problem, cracks=plan_of(last).cracks, numerics=numerics)
+    problem = rule.problem.with_cracks(plan_of(last).cracks, run_state(last).radius)
     _ = problem.placed  # an error here ends a run
     return problem
 
@@ -571,7 +568,8 @@ def _solved_step(
             corrected = correct(rule, last, rates, identities)
     corrected = add_K_error(rule, last, corrected, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
-    step = Step(
+    step = sound(
+        Step,
         index=index,
         cycles=corrected.cycles,
         cracks=rates.cracks,

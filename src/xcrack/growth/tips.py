@@ -827,9 +827,7 @@ def _cycles(
     return growth.cycles + curve - line, _CyclesError(_OF_SECOND * line_error, 0.0, both)
 
 
-def _better_known(
-    rule: GrowthRule, last: Step, spans: _Spans, line_error: float
-) -> _CyclesError:
+def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float) -> _CyclesError:
     """Errors of the cycles of a step behind the second.
 
     Two parabolas span the step before: that of its own, and that of the step behind it. The error

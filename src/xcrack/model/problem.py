@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AnySet
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
 from typing import Annotated, Any
@@ -24,7 +24,7 @@ from xcrack.base.arguments import (
     Whole,
     check_arguments,
 )
-from xcrack.base.checks import entries, number, value_text
+from xcrack.base.checks import entries, number, sound_copy, value_text
 from xcrack.base.errors import CoarseMeshError, ProblemError, XcrackError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
@@ -313,6 +313,24 @@ class Problem(Declared):
     def junctions(self) -> tuple[Junction, ...]:
         """In 2D: where cracks end on others."""
         return junctions(self.placed, self.mesh)
+
+    def with_cracks(self, cracks: Sequence[Crack], radius: float | None = None) -> "Problem":
+        """The same scene with cracks that have grown; while these are as many, no more is checked.
+
+        Parameters
+        ----------
+        cracks : sequence of Crack
+        radius : float, length, optional
+            Of the tip functions, in place of that of `numerics`.
+        """
+        numerics = self.numerics
+        if radius is not None and radius != numerics.radius:
+            numerics = replace(numerics, radius=radius)
+        if len(cracks) != len(self.cracks):
+            return replace(self, cracks=tuple(cracks), numerics=numerics)
+        result = sound_copy(self, cracks=tuple(cracks), numerics=numerics)
+        vars(result)["elasticity"] = self.elasticity
+        return result
 
     @property
     def frictions(self) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from xcrack.base import markup
 from xcrack.base.arguments import Number, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import numbers, value_text, whole_numbers
+from xcrack.base.checks import numbers, sound, value_text, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import require_package
 
@@ -330,6 +330,11 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
     dim : int
         Of the body: a crack may have no tip.
     """
+    if len(parts) == 1 and not parts[0].front.any():
+        for values in vars(parts[0]).values():
+            if isinstance(values, np.ndarray):
+                lock(values)
+        return parts[0]
     count = [len(part.K) for part in parts]
 
     def rows(name: str, *shape: int) -> Any:
@@ -340,7 +345,8 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
             return None
         return lock(np.concatenate([np.zeros((0, *shape)), *known]))
 
-    return SIF(
+    return sound(
+        SIF,
         x=rows("x", dim),
         frame=rows("frame", dim, dim),
         K=rows("K", dim),

@@ -1,7 +1,6 @@
 """K of a crack: at its tips in 2D, along its fronts in 3D."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import Choice, Either, Flag, Whole, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import value_text
+from xcrack.base.checks import sound_copy, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.machine import threads
 from xcrack.model.material import Material
@@ -120,10 +119,9 @@ def stress_intensities(
         )
     by_state = [joined_sif([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
-    K, T = np.zeros_like(by_state[0].K), np.where(np.isnan(by_state[0].T), np.nan, 0.0)
-    empty_sif = replace(by_state[0], K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
     result = [
-        empty_sif if s.at_rest else by_state[k] for s, k in zip(solutions, place, strict=True)
+        _without_K(by_state[0]) if s.at_rest else by_state[k]
+        for s, k in zip(solutions, place, strict=True)
     ]
     if isinstance(error, str) and error == "front":
         return with_bars(solutions, result, crack, error)
@@ -133,6 +131,12 @@ def stress_intensities(
         return with_bars(solutions, result, crack)
     warn_of_order(live[0], crack)
     return result
+
+
+def _without_K(sif: SIF) -> SIF:
+    """K of a state in which nothing acts."""
+    K, T = np.zeros_like(sif.K), np.where(np.isnan(sif.T), np.nan, 0.0)
+    return sound_copy(sif, K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
 
 
 def _checked_solutions(solutions: Any) -> list[Solution]:
