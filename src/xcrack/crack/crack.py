@@ -102,6 +102,22 @@ class Crack:
             frame[k] = ahead, (-left if tip == 0 else left)
         return lock(x), lock(frame)
 
+    @cached_property
+    def _last_faces(self) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Of each tip in 2D: end, begin, length and direction of its face, hand of its frame."""
+        x, frame = self._tips_and_frames
+        begin = self.points[[1 if tip == 0 else tip - 1 for tip in self.tips or ()]]
+        along = x - begin
+        (ahead, up), (back, down) = frame.transpose(1, 2, 0)
+        length, direction = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
+        return (
+            x,
+            lock(begin),
+            lock(length),
+            lock(direction),
+            lock(np.sign(ahead * down - up * back)),
+        )
+
     def __repr__(self) -> str:
         ends = "not placed"
         if self.fronts is not None:

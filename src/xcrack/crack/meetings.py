@@ -12,7 +12,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.advance_2d import with_tips
-from xcrack.crack.crack import Crack, tip_frames
+from xcrack.crack.crack import Crack
 from xcrack.crack.lines import crossing_points, polyline_crack
 from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.locate import cell_sizes, contains
@@ -48,23 +48,11 @@ class Faces:
 
 def last_faces(cracks: Sequence[Crack]) -> Faces:
     """The last faces of all tips of placed cracks."""
-    tip, anchor, side = [np.zeros((0, 2))], [np.zeros((0, 2))], [np.zeros(0)]
-    for crack in cracks:
-        x, frame = tip_frames(crack)
-        before = [crack.points[1 if tip == 0 else tip - 1] for tip in crack.tips or ()]
-        tip.append(x)
-        anchor.append(np.array(before).reshape(-1, 2))
-        (ahead, up), (back, down) = frame.reshape(-1, 2, 2).transpose(1, 2, 0)
-        side.append(np.sign(ahead * down - up * back))
-    ends, begins = np.concatenate(tip), np.concatenate(anchor)
-    along = ends - begins
-    return Faces(
-        ends,
-        begins,
-        np.linalg.norm(along, axis=1),
-        np.arctan2(along[:, 1], along[:, 0]),
-        np.concatenate(side),
-    )
+    if len(cracks) == 1:
+        return Faces(*cracks[0]._last_faces)
+    none = [np.zeros((0, 2))] * 2 + [np.zeros(0)] * 3
+    parts = zip(none, *(crack._last_faces for crack in cracks), strict=True)
+    return Faces(*map(np.concatenate, parts))
 
 
 def moved_on(faces: Faces, grown: Bools, size: Floats) -> Bools:

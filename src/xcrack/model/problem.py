@@ -325,7 +325,7 @@ class Problem(Declared):
         """
         numerics = self.numerics
         if radius is not None and radius != numerics.radius:
-            numerics = replace(numerics, radius=radius)
+            numerics = sound_copy(numerics, radius=radius)
         if len(cracks) != len(self.cracks):
             return replace(self, cracks=tuple(cracks), numerics=numerics)
         result = sound_copy(self, cracks=tuple(cracks), numerics=numerics)
