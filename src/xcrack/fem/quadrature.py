@@ -12,172 +12,33 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints, lock, offsets, ranges
 from xcrack.base.errors import GeometryError
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.mesh.distances import closest_on_segment
 from xcrack.mesh.mesh import local_edges
 from xcrack.mesh.simplex import SYMMETRIC, cut_simplices, gauss, simplex_rule
 
 # Integration points around the tips of cracks in 2D.
 
 _LEVELS = 5  # bisections towards a tip before the fan takes over
-_SECTOR = 0.6  # rad, widest sector of a fan
 _EDGE_POINTS = 6  # Gauss points of a boundary piece
 
 
-def tip_points(
-    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int
+def _plane_points(
+    space: FunctionSpace, subs: "SubCells", with_tip: Bools, n: int, degree: int
 ) -> tuple[Ints, Floats, Floats]:
-    """Points in sub-cells on which tip functions act.
+    """Number, place and share of the points of sub-cells, in their order."""
+    from xcrack.mesh.kernels.splitting import triangle_points
 
-    Parameters
-    ----------
-    space : FunctionSpace
-    cell : (s,) array of int
-    bary : (s, 3, 3) array
-        Vertices of the sub-cells in their cells.
-    share : (s,) array
-        Of the cell's volume.
-    fan : (s,) array of bool
-        Vertex 0 is a tip.
-    n : int
-        Points a direction.
-
-    Returns
-    -------
-    number : (q,) array of int
-        Sub-cell of each point.
-    place : (q, 3) array
-        In barycentric coordinates of the cell.
-    weight : (q,) array
-        As a share of the cell's volume.
-    """
-    regular_parts, regular_bary, regular_share, fans = _towards_tips(space, cell, bary, share, fan)
+    mesh = space.mesh
+    tips = np.array([tip.x for tip in space.tips]).reshape(-1, 2)
     # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
     # enough (K is the same to its error with half of the points, measured).
-    degree = max(2 * n - 3, 3)
-    rule, weight = simplex_rule(space.dim, degree)
-    if degree > SYMMETRIC:
-        regular_bary = _from_tips(space, cell[regular_parts], regular_bary)
-    place = np.einsum("pv,svb->spb", rule, regular_bary).reshape(-1, space.dim + 1)
-    sub, bary_of_fans, swept_share = _fan_points(space, cell, fans, n)
-    return (
-        np.concatenate([np.repeat(regular_parts, len(weight)), sub]),
-        np.concatenate([place, bary_of_fans]),
-        np.concatenate([np.outer(regular_share, weight).ravel(), swept_share]),
-    )
-
-
-def _from_tips(space: FunctionSpace, cell: Ints, bary: Floats) -> Floats:
-    """Vertices of simplices, those nearer to a tip first.
-
-    A conical rule is not symmetric: with an order that geometry decides, points do not depend
-    on how nodes are numbered.
-    """
-    x = np.einsum("svb,sbd->svd", bary, space.mesh.points[space.mesh.cells[cell]])
-    distance = np.min([np.linalg.norm(x - tip.x, axis=2) for tip in space.tips], axis=0)
-    steps = np.rint(distance / (1e-9 * distance.max(axis=1, keepdims=True)))
-    order = np.argsort(steps, axis=1, kind="stable")
-    return np.take_along_axis(bary, order[:, :, None], axis=1)
-
-
-_Fans = tuple[Ints, Floats, Floats]
-
-
-def _towards_tips(
-    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools
-) -> tuple[Ints, Floats, Floats, _Fans]:
-    """Bisect sub-cells until they are no larger than their distance to a tip."""
-    from xcrack.mesh.kernels.splitting import bisect
-
-    mesh = space.mesh
-    tips = np.array([tip.x for tip in space.tips]).reshape(-1, mesh.dim)
-    fan_rows, others = np.nonzero(fan)[0], np.nonzero(~fan)[0]
-    fans = [(fan_rows, bary[fan_rows], share[fan_rows])]
-    x = bary[others] @ mesh.points[mesh.cells[cell[others]]]
-
-    def parts(n: int) -> tuple[Ints, Floats, Ints, Bools]:
-        integers = np.empty((2, n), dtype=np.int64)
-        return integers[0], np.empty((n, 3, 3)), integers[1], np.empty(n, dtype=bool)
-
-    pieces = parts(bisect(x, tips, _LEVELS, False, *parts(0)))
-    bisect(x, tips, _LEVELS, True, *pieces)
-    owner, local, depth, is_near = pieces
-    number = others[owner]
-    bary, share = local @ bary[number], share[number] / 4.0**depth
-    if is_near.any():
-        x = local[is_near] @ x[owner[is_near]]
-        middle = x.mean(axis=1)
-        nearest = np.argmin(np.linalg.norm(middle[:, None] - tips, axis=2), axis=1)
-        fans.append(_fan_around(number[is_near], bary[is_near], share[is_near], x, tips[nearest]))
-    f = tuple(np.concatenate(p) for p in zip(*fans, strict=True))
-    return number[~is_near], bary[~is_near], share[~is_near], (f[0], f[1], f[2])
-
-
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-
-def _fan_around(number: Ints, bary: Floats, share: Floats, x: Floats, tip: Floats) -> _Fans:
-    """Split triangles into fans around their points nearest to a tip outside them."""
-    pairs = [(0, 1), (1, 2), (2, 0)]
-    foot = np.stack([closest_on_segment(tip, x[:, i], x[:, j]) for i, j in pairs], axis=1)
-    best = np.argmin(np.linalg.norm(foot - tip[:, None], axis=2), axis=1)
-    row = np.arange(len(x))
-    i, j = np.array(pairs)[best].T
-    edge = x[row, j] - x[row, i]
-    t = np.clip(
-        ((foot[row, best] - x[row, i]) * edge).sum(axis=1) / (edge * edge).sum(axis=1), 0, 1
-    )[:, None]
-    apex = (1 - t) * bary[row, i] + t * bary[row, j]
-    k = 3 - i - j
-    both = [
-        (np.stack([apex, bary[row, k], bary[row, i]], axis=1), share * t[:, 0]),
-        (np.stack([apex, bary[row, j], bary[row, k]], axis=1), share * (1 - t[:, 0])),
-    ]
-    keep = [s > 1e-14 * share for _, s in both]
-    return (
-        np.concatenate([number[k] for k in keep]),
-        np.concatenate([b[k] for (b, _), k in zip(both, keep, strict=True)]),
-        np.concatenate([s[k] for (_, s), k in zip(both, keep, strict=True)]),
-    )
-
-
-def _fan_points(
-    space: FunctionSpace, cell: Ints, fans: _Fans, n: int
-) -> tuple[Ints, Floats, Floats]:
-    """Sweep triangles from vertex 0 in sectors, x = A + s² (E - A), E on the far side.
-
-    Exact for polynomials, and for products of derivatives of the tip functions along r; the
-    angle is resolved by sectors of at most 0.6 rad.
-    """
-    number, bary, share = fans
-    mesh = space.mesh
-    x = np.einsum("svb,sbd->svd", bary, mesh.points[mesh.cells[cell[number]]])
-    left_edge, right_edge = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
-    a, b = np.linalg.norm(left_edge, axis=1), np.linalg.norm(right_edge, axis=1)
-    angle = np.abs(np.arctan2(_cross(left_edge, right_edge), (left_edge * right_edge).sum(axis=1)))
-    sectors = np.maximum(np.ceil(angle / _SECTOR), 1).astype(np.int64)
-    row, k = ranges(sectors)
-
-    def position(part: Floats) -> Floats:
-        part = np.clip(part, 0.0, 1.0)
-        first, last = a[row] * np.sin(part * angle[row]), b[row] * np.sin((1 - part) * angle[row])
-        total = first + last
-        return np.where(total > 0, first / np.where(total > 0, total, 1.0), part)
-
-    begin, end = position(k / sectors[row]), position((k + 1) / sectors[row])
-    s, ws = gauss(n + 1)
-    t, wt = gauss(n + 4)
-    tau = begin[:, None] + (end - begin)[:, None] * t
-    far_points = (1 - tau)[..., None] * bary[row, 1][:, None] + tau[..., None] * bary[row, 2][
-        :, None
-    ]
-    u = (s * s)[None, :, None, None]
-    points = (1 - u) * bary[row, 0][:, None, None] + u * far_points[:, None]
-    # dV = 2 area u du dtau with u = s².
-    radial_weight = 4 * s**3 * ws
-    weight = (share[row] * (end - begin))[:, None, None] * radial_weight[None, :, None] * wt
-    each = len(s) * len(t)
-    return np.repeat(number[row], each), points.reshape(-1, 3), weight.ravel()
+    enough = max(2 * n - 3, 3)
+    corners = subs.bary @ mesh.points[mesh.cells[subs.cell]]
+    number, place, share = triangle_points(
+        subs.bary, corners, subs.fraction, with_tip, subs.fan, tips, _LEVELS,
+        *simplex_rule(2, degree), *simplex_rule(2, enough), enough > SYMMETRIC, *gauss(n + 1),
+        *gauss(n + 4),
+    )  # fmt: skip
+    return number, place, share
 
 
 def segment_points(
@@ -234,7 +95,7 @@ def radius_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
 
 
 def front_points(
-    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, n: int
 ) -> tuple[Ints, Floats, Floats]:
     """Points in sub-cells on which tip functions act.
 
@@ -246,8 +107,6 @@ def front_points(
         Vertices of the sub-cells in their cells.
     share : (s,) array
         Of the cell's volume.
-    fan : (s,) array of bool
-        Not used: which vertices lie on the front follows from the level sets.
     n : int
         Gauss points along the angle at a front; at order 2 one more.
 
@@ -279,7 +138,7 @@ def front_points(
 
 
 def graded_points(
-    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, fan: Bools, n: int, degree: int
+    space: FunctionSpace, cell: Ints, bary: Floats, share: Floats, n: int, degree: int
 ) -> tuple[Ints, Floats, Floats]:
     """Points in sub-cells on which tip functions act, for K.
 
@@ -288,7 +147,7 @@ def graded_points(
 
     Parameters
     ----------
-    space, cell, bary, share, fan, n
+    space, cell, bary, share, n
         As of `front_points`.
     degree : int
         Degree of polynomials integrated exactly away from the front.
@@ -734,6 +593,10 @@ def cell_points(
     """
     subs = sub_cells(space, cells)
     with_tip = space.has_tip[subs.cell]
+    if space.dim == 2:
+        number, where, share = _plane_points(space, subs, with_tip, n, degree)
+        cell = subs.cell[number]
+        return Points(cell, where, share * space.mesh.volume[cell], subs.side[number])
     plain_rows = (~with_tip).nonzero()[0]
     bary, weight = simplex_rule(space.dim, degree)
     number = np.repeat(plain_rows, len(weight))
@@ -742,11 +605,8 @@ def cell_points(
     rows = with_tip.nonzero()[0]
     if not len(rows):
         return _sorted_points(space, subs, number, where, share)
-    is_near = (subs.cell[rows], subs.bary[rows], subs.fraction[rows], subs.fan[rows], n)
-    if is_graded:
-        sub, place, part = graded_points(space, *is_near, degree)
-    else:
-        sub, place, part = _NEAR_TIPS[space.dim](space, *is_near)
+    is_near = space, subs.cell[rows], subs.bary[rows], subs.fraction[rows], n
+    sub, place, part = graded_points(*is_near, degree) if is_graded else front_points(*is_near)
     return _sorted_points(
         space,
         subs,
@@ -754,10 +614,6 @@ def cell_points(
         np.concatenate([where, place]),
         np.concatenate([share, part]),
     )
-
-
-# Points in sub-cells on which tip functions act.
-_NEAR_TIPS = {2: tip_points, 3: front_points}
 
 
 def _sorted_points(

@@ -1,4 +1,4 @@
-"""Simplices split: by a linear function, segments by cracks, and both towards tips."""
+"""Simplices split by linear functions, segments by cracks; points of both, denser towards tips."""
 
 import math
 
@@ -9,6 +9,7 @@ from xcrack.base.kernels.jit import kernel
 _FOOT = 1e-9  # share of a segment within which a foot at its end is the end
 _ROUND_OFF = 1e-15  # of coordinates, as a share of the largest of them
 _SAME = 1e-9  # relative difference below which values or lengths are equal
+_SECTOR = 0.6  # rad, widest sector of a fan
 
 
 @kernel
@@ -396,33 +397,185 @@ def _distance(x, y, corner):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore[no-untyped-def]
-    """Quarter triangles until they are no larger than their distance to every tip.
+def _longest_side(corner):  # type: ignore[no-untyped-def]
+    """Longest side of a triangle (3, 2)."""
+    size = 0.0
+    for i in range(3):
+        j = (i + 1) % 3
+        size = max(size, math.hypot(corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1]))
+    return size
+
+
+@kernel
+def _with_room(table, count, more):  # type: ignore[no-untyped-def]
+    """A table with so many more rows than those in use, twice as long where it is too short."""
+    if count + more <= len(table):
+        return table
+    longer = np.empty((2 * (count + more), table.shape[1]))
+    longer[:count] = table[:count]
+    return longer
+
+
+@kernel
+def _put_rule(table, count, number, vertex, share, bary, weight):  # type: ignore[no-untyped-def]
+    """Points of a rule in a triangle with these vertices; the table and its number of rows."""
+    table = _with_room(table, count, len(weight))
+    for p in range(len(weight)):
+        table[count, 0] = number
+        for b in range(3):
+            x = bary[p, 0] * vertex[0, b]
+            table[count, 1 + b] = x + bary[p, 1] * vertex[1, b] + bary[p, 2] * vertex[2, b]
+        table[count, 4] = share * weight[p]
+        count += 1
+    return table, count
+
+
+@kernel
+def _put_fan(table, count, number, vertex, corner, share, s, ws, t, wt):  # type: ignore[no-untyped-def]
+    """Points that sweep a triangle from vertex 0 in sectors, x = A + s² (E - A), E on the far side.
+
+    Exact for polynomials, and for products of derivatives of the tip functions along r; the angle
+    is resolved by sectors of at most 0.6 rad.
+    """
+    ax, ay = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]
+    bx, by = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
+    a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+    angle = abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
+    sectors = max(int(math.ceil(angle / _SECTOR)), 1)
+    table = _with_room(table, count, sectors * len(s) * len(t))
+    end = 0.0
+    for k in range(sectors):
+        begin, part = end, (k + 1) / sectors
+        first, last = a * math.sin(part * angle), b * math.sin((1 - part) * angle)
+        end = first / (first + last) if first + last > 0 else part
+        for i in range(len(s)):
+            u, radial = s[i] * s[i], 4 * s[i] ** 3 * ws[i]  # dV = 2 area u du dtau with u = s²
+            for j in range(len(t)):
+                tau = begin + (end - begin) * t[j]
+                table[count, 0] = number
+                for v in range(3):
+                    far = (1 - tau) * vertex[1, v] + tau * vertex[2, v]
+                    table[count, 1 + v] = (1 - u) * vertex[0, v] + u * far
+                table[count, 4] = share * (end - begin) * radial * wt[j]
+                count += 1
+    return table, count
+
+
+@kernel
+def _nearest_tip(corner, tips):  # type: ignore[no-untyped-def]
+    """Number of the tip nearest to the middle of a triangle."""
+    x = (corner[0, 0] + corner[1, 0] + corner[2, 0]) / 3
+    y = (corner[0, 1] + corner[1, 1] + corner[2, 1]) / 3
+    nearest, least = 0, np.inf
+    for k in range(len(tips)):
+        distance = math.hypot(x - tips[k, 0], y - tips[k, 1])
+        if distance < least:
+            nearest, least = k, distance
+    return nearest
+
+
+@kernel
+def _put_fans_around(  # type: ignore[no-untyped-def]
+    table, count, number, vertex, corner, share, tip, s, ws, t, wt, fan, fan_corner
+):
+    """Points of two fans around the place of a triangle that is nearest to a tip outside it."""
+    best, along, least = 0, 0.0, np.inf
+    for i in range(3):
+        j = (i + 1) % 3
+        dx, dy = corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1]
+        x, y = tip[0] - corner[i, 0], tip[1] - corner[i, 1]
+        at = min(max((x * dx + y * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
+        distance = math.hypot(x - at * dx, y - at * dy)
+        if distance < least:
+            best, along, least = i, at, distance
+    i, j, k = best, (best + 1) % 3, (best + 2) % 3
+    for half in range(2):
+        part, second, third = (along, k, i) if half == 0 else (1 - along, j, k)
+        if part <= 1e-14:
+            continue
+        for b in range(3):
+            fan[0, b] = (1 - along) * vertex[i, b] + along * vertex[j, b]
+            fan[1, b], fan[2, b] = vertex[second, b], vertex[third, b]
+        for b in range(2):
+            fan_corner[0, b] = (1 - along) * corner[i, b] + along * corner[j, b]
+            fan_corner[1, b], fan_corner[2, b] = corner[second, b], corner[third, b]
+        table, count = _put_fan(table, count, number, fan, fan_corner, share * part, s, ws, t, wt)
+    return table, count
+
+
+@kernel
+def _put_nearest_first(vertex, corner, tips):  # type: ignore[no-untyped-def]
+    """Sort the vertices of a triangle by their distance to the nearest tip.
+
+    A conical rule is not symmetric: with an order that geometry decides, points do not depend on
+    how nodes are numbered.
+    """
+    away, largest = np.empty(3), 0.0
+    for i in range(3):
+        away[i] = np.inf
+        for k in range(len(tips)):
+            distance = math.hypot(corner[i, 0] - tips[k, 0], corner[i, 1] - tips[k, 1])
+            away[i] = min(away[i], distance)
+        largest = max(largest, away[i])
+    for end in (2, 1):
+        for i in range(end):
+            if away[i + 1] < away[i] - _SAME * largest:
+                away[i], away[i + 1] = away[i + 1], away[i]
+                for b in range(3):
+                    vertex[i, b], vertex[i + 1, b] = vertex[i + 1, b], vertex[i, b]
+
+
+@kernel
+def triangle_points(  # type: ignore[no-untyped-def]
+    bary, corners, share, bears_tip, fan, tips, levels, plain, plain_share, near, near_share,
+    is_conical, s, ws, t, wt,
+):  # fmt: skip
+    """Integration points of triangles, denser towards tips where their functions act.
+
+    Triangles on which tip functions act are quartered until they are no larger than their distance
+    to every tip; what is still too large then, and what has a tip as a vertex, is swept in a fan.
 
     Parameters
     ----------
-    x : (s, 3, 2) array
-    tips : (t, 2) array
+    bary : (k, 3, 3) array
+        Vertices in some barycentric coordinates.
+    corners : (k, 3, 2) array, length
+    share : (k,) array
+        Of the area of what these coordinates belong to.
+    bears_tip, fan : (k,) arrays of bool
+        Tip functions act; vertex 0 is a tip.
+    tips : (m, 2) array
     levels : int
         Most bisections.
-    fill : bool
-        Whether the parts are written; else they are counted only.
-    owner : (n,) array of int
-    bary : (n, 3, 3) array
-        Vertices of each part in its triangle.
-    depth : (n,) array of int
-    near_tip : (n,) array of bool
-        Still too large after all bisections.
+    plain, plain_share : (p, 3) and (p,) arrays
+        Rule of triangles without tip functions.
+    near, near_share : (p, 3) and (p,) arrays
+        Rule of those with tip functions that lie away from tips.
+    is_conical : bool
+        It is not symmetric.
+    s, ws, t, wt : (i,) and (j,) arrays
+        Gauss rules of fans, along the radius and across.
 
     Returns
     -------
-    int
-        Number of parts.
+    number : (q,) array of int
+        Triangle of each point, increasing.
+    place : (q, 3) array
+    weight : (q,) array
     """
     stack, depths = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
-    triangle, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
-    count = 0
-    for s in range(len(x)):
+    part, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
+    vertex, one, one_corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
+    table, count = np.empty((len(bary) * len(plain_share), 5)), 0
+    for k in range(len(bary)):
+        if not bears_tip[k]:
+            table, count = _put_rule(table, count, k, bary[k], share[k], plain, plain_share)
+            continue
+        if fan[k]:
+            table, count = _put_fan(
+                table, count, k, bary[k], corners[k], share[k], s, ws, t, wt
+            )  # fmt: skip
+            continue
         top = 1
         depths[0] = 0
         for i in range(3):
@@ -433,42 +586,48 @@ def bisect(x, tips, levels, fill, owner, bary, depth, near_tip):  # type: ignore
             level = depths[top]
             for i in range(3):
                 for b in range(3):
-                    triangle[i, b] = stack[top, i, b]
-                for k in range(2):
-                    corner[i, k] = 0.0
+                    part[i, b] = stack[top, i, b]
+                    vertex[i, b] = 0.0
+                for j in range(2):
+                    corner[i, j] = 0.0
+                for v in range(3):
                     for b in range(3):
-                        corner[i, k] += triangle[i, b] * x[s, b, k]
-            size = 0.0
-            for i in range(3):
-                j = (i + 1) % 3
-                edge = math.hypot(corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1])
-                size = max(size, edge)
-            is_close = False
-            for t in range(len(tips)):
+                        vertex[i, b] += part[i, v] * bary[k, v, b]
+                    for j in range(2):
+                        corner[i, j] += part[i, v] * corners[k, v, j]
+            size, is_close = _longest_side(corner), False
+            for m in range(len(tips)):
                 # Equal lengths are common in regular meshes: round-off must not decide.
-                if size > (1.0 + _SAME) * _distance(tips[t, 0], tips[t, 1], corner):
+                if size > (1.0 + _SAME) * _distance(tips[m, 0], tips[m, 1], corner):
                     is_close = True
                     break
-            if not is_close or level == levels:
-                if fill:
-                    owner[count] = s
-                    for i in range(3):
-                        for b in range(3):
-                            bary[count, i, b] = triangle[i, b]
-                    depth[count] = level
-                    near_tip[count] = is_close
-                count += 1
+            if not is_close:
+                if is_conical:
+                    _put_nearest_first(vertex, corner, tips)
+                own = share[k] / 4.0**level
+                table, count = _put_rule(table, count, k, vertex, own, near, near_share)
+                continue
+            if level == levels:
+                table, count = _put_fans_around(
+                    table, count, k, vertex, corner, share[k] / 4.0**level,
+                    tips[_nearest_tip(corner, tips)], s, ws, t, wt, one, one_corner,
+                )  # fmt: skip
                 continue
             for i in range(3):
                 for b in range(3):
-                    middle[i, b] = (triangle[i, b] + triangle[(i + 1) % 3, b]) / 2
+                    middle[i, b] = (part[i, b] + part[(i + 1) % 3, b]) / 2
             for i in range(3):
                 for b in range(3):
                     stack[top, i, b] = middle[i, b]
-                    stack[top + 1 + i, 0, b] = triangle[i, b]
+                    stack[top + 1 + i, 0, b] = part[i, b]
                     stack[top + 1 + i, 1, b] = middle[i, b]
                     stack[top + 1 + i, 2, b] = middle[(i + 2) % 3, b]
             for i in range(4):
                 depths[top + i] = level + 1
             top += 4
-    return count
+    number, place, weight = np.empty(count, np.int64), np.empty((count, 3)), np.empty(count)
+    for q in range(count):
+        number[q], weight[q] = int(table[q, 0]), table[q, 4]
+        for b in range(3):
+            place[q, b] = table[q, 1 + b]
+    return number, place, weight
