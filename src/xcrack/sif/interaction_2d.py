@@ -270,6 +270,8 @@ def _load_terms(
 
 def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
     """Full lip term of each state, domain and field `(s, radii, 3)`."""
+    from xcrack.sif.kernels.ring import add_lips
+
     space, t, radii = solutions[0].space, ring.t, ring.radii
     tip, lips = space.tips[t], solutions[0].lips[space.tips[t].crack]
     result = np.zeros((len(solutions), len(radii), 3))
@@ -282,7 +284,6 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
         None if x is None else x[is_near] for x in (lip_shear(s, tip.crack) for s in solutions)
     ]
     R = tip.frame
-    tip_material = material_at_tip(solutions[0], t)
     xi = way[is_near] @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
@@ -291,37 +292,18 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
     if not bent and not pressure.any() and not rubs:
         return result
     # Both faces at once, face - first.
-    n, w, steady = (
-        len(xi),
-        lips.weight[is_near],
-        [_steady_stress(solution, t) for solution in solutions],
-    )
     cell, bary = lips.cell[is_near], lips.bary[is_near]
     faces = [lip_side(space, tip.crack, cell[:, s], bary[:, s], 2 * s - 1) for s in (0, 1)]
-    side = np.concatenate(faces)
-    xi = np.concatenate([xi, xi])
-    r, theta = continued_polar(xi, side[:, tip.crack], np.ones(2 * n, dtype=bool))
-    outward = lips.normal[is_near] @ R.T
-    outward = np.concatenate([outward, -outward])
-    q, _ = weight(r, xi, ring.inner, radii)
-    aux = _auxiliary_fields(solutions, t, r, theta)
-    local, stresses = None, []
+    gradient, shear = np.zeros((0, 2, 2, len(solutions))), np.zeros((0, len(xi), 2))
     if bent:
-        stresses = [tip_material.stress(field.gradient) for field in aux]
         places = cell.T.ravel(), np.concatenate([bary[:, 0], bary[:, 1]])
-        gradient = gradients_at(space, ring.coefficients, *places, side) - ring.turn
-        local = np.einsum("ai,qijs,bj->sqab", R, gradient, R)
-    for k in range(len(solutions)):
-        traction, shear = -np.concatenate([pressure[k], pressure[k]])[:, None] * outward, shears[k]
-        if shear is not None:
-            shear = shear @ R.T
-            traction += np.concatenate([-shear, shear])
-        sigma = None if local is None else tip_material.stress(local[k]) + steady[k]
-        for m, field in enumerate(aux):
-            density = np.einsum("qi,qi->q", traction, field.gradient[:, :, 0])
-            if local is not None and sigma is not None:
-                density += np.einsum("qij,qj,qi->q", stresses[m], outward, local[k][:, :, 0])
-                density -= np.einsum("qij,qij->q", sigma, field.gradient) * outward[:, 0]
-            for face in (slice(n), slice(n, None)):
-                result[k, :, m] -= q[:, face] @ (w * density[face])
+        gradient = gradients_at(space, ring.coefficients, *places, np.concatenate(faces))
+    if rubs:
+        shear = np.stack([np.zeros_like(xi) if x is None else x for x in shears])
+    steady = np.stack([_steady_stress(solution, t) for solution in solutions])
+    _, *constants = _constants(solutions[0], ring)
+    add_lips(
+        result, xi, lips.normal[is_near] @ R.T, np.stack([face[:, tip.crack] for face in faces]),
+        lips.weight[is_near], pressure, shear, gradient, steady, *constants,
+    )  # fmt: skip
     return result

@@ -339,3 +339,67 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
                     frame, modes, kolosov, mu, g, fall,
                     change[place, min(p, change.shape[1] - 1)], bend,
                 )  # fmt: skip
+
+
+@kernel
+def add_lips(  # type: ignore[no-untyped-def]
+    total, xi, outward, side, weight, pressure, shear, gradient, steady, turn, radii, inner, frame,
+    modes, kolosov, lam, mu,
+):  # fmt: skip
+    """Add the full lip term of each state, domain and field.
+
+    Parameters
+    ----------
+    total, turn, radii, inner, frame, modes, kolosov, lam, mu
+        As of `add_points`.
+    xi : (n, 2) array, length
+        Places from the tip, in its frame.
+    outward : (n, 2) array
+        Normals of lip - in the frame, out of the body.
+    side : (2, n) array of int
+        Side of the crack of the points on both lips, - first.
+    weight : (n,) array, length
+    pressure : (s, n) array
+        On both lips.
+    shear : (s or 0, n, 2) array
+        Traction on lip + in global axes.
+    gradient : (2 n or 0, 2, 2, s) array
+        Of the displacements at the points of both lips, global axes; of length 0 where the crack is
+        straight, so that the unit fields leave it free of traction.
+    steady : (s, 2, 2) array
+        Initial stress at the tip in its frame.
+    """
+    g, sigma, straight = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.eye(2)
+    states, n = total.shape[0], len(xi)
+    local = np.empty((2, 2, states))
+    for p in range(n):
+        for face in range(2):
+            sign = 1.0 - 2.0 * face
+            n0, n1 = sign * outward[p, 0], sign * outward[p, 1]
+            r, _, _, c, s = _place(straight, xi[p, 0], xi[p, 1], side[face, p], True)
+            _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
+            if len(gradient) > 0:
+                _into_frame(frame, gradient[face * n + p], turn, local)
+            for state in range(states):
+                t0, t1 = -pressure[state, p] * n0, -pressure[state, p] * n1
+                if len(shear) > 0:
+                    x, y = shear[state, p, 0], shear[state, p, 1]
+                    t0 -= sign * (frame[0, 0] * x + frame[0, 1] * y)
+                    t1 -= sign * (frame[1, 0] * x + frame[1, 1] * y)
+                for m in range(3):
+                    density = t0 * g[m, 0, 0] + t1 * g[m, 1, 0]
+                    if len(gradient) > 0:
+                        a, b = local[0, 0, state], local[1, 0, state]
+                        e, f = local[0, 1, state], local[1, 1, state]
+                        density += (sigma[m, 0, 0] * n0 + sigma[m, 0, 1] * n1) * a
+                        density += (sigma[m, 1, 0] * n0 + sigma[m, 1, 1] * n1) * b
+                        trace, slide = lam * (a + f), mu * (e + b)
+                        power = (trace + 2.0 * mu * a + steady[state, 0, 0]) * g[m, 0, 0]
+                        power += (slide + steady[state, 0, 1]) * g[m, 0, 1]
+                        power += (slide + steady[state, 1, 0]) * g[m, 1, 0]
+                        power += (trace + 2.0 * mu * f + steady[state, 1, 1]) * g[m, 1, 1]
+                        density -= power * n0
+                    for k in range(len(radii)):
+                        z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
+                        q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
+                        total[state, k, m] -= q * weight[p] * density
