@@ -117,11 +117,11 @@ class SolveHistory:
 
     def angles(self, frame: Floats) -> Floats:
         """Angles of the directions in frames `(k, n)`, without jumps by a full turn, rad."""
-        along = np.einsum("knj,nj->kn", self.direction, frame[:, 0])
-        across = np.einsum("knj,nj->kn", self.direction, frame[:, 1])
-        angle = np.arctan2(across, along)
-        for k in range(len(angle) - 2, -1, -1):
-            angle[k] += 2 * np.pi * np.round((angle[k + 1] - angle[k]) / (2 * np.pi))
+        local = np.einsum("nij,knj->kin", frame[:, :2], self.direction)
+        angle = np.arctan2(local[:, 1], local[:, 0])
+        if np.abs(angle[1:] - angle[:-1]).max(initial=0.0) > np.pi:
+            for k in range(len(angle) - 2, -1, -1):
+                angle[k] += 2 * np.pi * np.round((angle[k + 1] - angle[k]) / (2 * np.pi))
         return np.asarray(angle)
 
 
@@ -277,14 +277,20 @@ class _Pieces:
     """Points `s` (q,) in a piece of σ, and what is counted there.
 
     Their weights `(q,)`, and dx/dσ of each path `(q, n)`: with these the arcs `(n,)` and the cycles
-    of the whole piece.
+    of the whole piece. The solves are at `nodes` (k,).
     """
 
+    nodes: Floats
     s: Floats
     weight: Floats
     share: Floats
     arc: Floats
     cycles: float
+
+    @cached_property
+    def turns(self) -> list[Floats]:
+        """Shares of the directions of the solves in that at the points, an array (q, 1) a solve."""
+        return lagrange_shares(self.nodes, self.s[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,16 +335,15 @@ class Stretch:
             sigma = np.append(self.marched.sigma[inside], length)
             share = np.diff(np.vstack([self.marched.arc[inside], arc]), axis=0)
             s = self.start + 0.5 * (sigma[1:] + sigma[:-1])
-            return _Pieces(s, np.ones(len(share)), share, arc, cycles)
+            return _Pieces(self.solves.sigma, s, np.ones(len(share)), share, arc, cycles)
         s, weight = self.start + length * _POINTS, length * _WEIGHTS
         rate = rates_at(self.solves, s, self.threshold)
         largest = rate.max(axis=1, initial=0.0)
         grows = largest > 0
         safe = np.where(grows, largest, 1.0)
         share = np.where(grows[:, None], rate / safe[:, None], 0.0)
-        return _Pieces(
-            s, weight, share, weight @ share, float(weight @ np.where(grows, 1 / safe, 0.0))
-        )
+        cycles = float(weight @ np.where(grows, 1 / safe, 0.0))
+        return _Pieces(self.solves.sigma, s, weight, share, weight @ share, cycles)
 
     def growth(self, frame: Floats, angle: Floats, length: float | None = None) -> Growth:
         """Growth in the directions of the solves, over all of it or a first part.
@@ -355,11 +360,12 @@ class Stretch:
         dx_i/dσ = r_i / max_j r_j (cos θ_i t + sin θ_i n), dN/dσ = 1 / max_j r_j. θ is bend √σ and a
         polynomial through the angles of all solves.
         """
-        pieces = self._whole if length is None else self._up_to(length)
-        solves, s = self.solves, pieces.s[:, None]
-        root = np.sqrt(solves.sigma[:, None])
-        shares = lagrange_shares(solves.sigma, s)
-        theta = _sum(shares, angle - solves.bend * root) + solves.bend * np.sqrt(s)
+        pieces, bend = self._whole if length is None else self._up_to(length), self.solves.bend
+        if bend.any():
+            smooth = angle - bend * np.sqrt(pieces.nodes[:, None])
+            theta = _sum(pieces.turns, smooth) + bend * np.sqrt(pieces.s[:, None])
+        else:
+            theta = _sum(pieces.turns, angle)
         along, across = (pieces.weight @ (pieces.share * f(theta)) for f in (np.cos, np.sin))
         move = along[:, None] * frame[:, 0] + across[:, None] * frame[:, 1]
         return Growth(move, pieces.arc, pieces.cycles)

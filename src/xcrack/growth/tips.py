@@ -608,10 +608,8 @@ def _corrected_points(
     for _ in range(_PASSES):
         growth = stretch.growth(frame, angle)
         face = stations.x + growth.move - begin_of_face
-        turn = np.arctan2(
-            np.einsum("nj,nj->n", face, frame[:, 1]), np.einsum("nj,nj->n", face, frame[:, 0])
-        )
-        angle[-1] = solved + gamma * turn
+        local = np.einsum("nij,nj->in", frame, face)
+        angle[-1] = solved + gamma * np.arctan2(local[1], local[0])
     solves = solves.with_direction(replace(rates, angle=angle[-1]).direction)
     x = stations.x + growth.move
     try:
