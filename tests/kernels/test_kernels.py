@@ -147,31 +147,36 @@ def test_dense_blocks():
     np.testing.assert_array_equal(result, np.concatenate([first.ravel(), second.ravel()]))
 
 
-def test_bisect_fills_triangles_and_stops_at_tips():
-    """Parts add up to their triangle; none is larger than its distance to a tip but the marked."""
-    from xcrack.mesh.kernels.splitting import bisect
+def test_points_of_triangles_near_tips():
+    """Moments are exact on every triangle; next to a tip points are as dense as their distance."""
+    from xcrack.mesh.kernels.splitting import triangle_points
+    from xcrack.mesh.simplex import gauss, simplex_rule
 
     rng = np.random.default_rng(4410)
-    x, tips = rng.uniform(size=(20, 3, 2)), rng.uniform(size=(2, 2))
-    nothing = np.empty(0, int), np.empty((0, 3, 3)), np.empty(0, int), np.empty(0, bool)
-    n = bisect(x, tips, 4, False, *nothing)
-    owner, depth = np.empty(n, np.int64), np.empty(n, np.int64)
-    bary, near = np.empty((n, 3, 3)), np.empty(n, bool)
-    assert bisect(x, tips, 4, True, owner, bary, depth, near) == n
-    assert np.bincount(owner, 0.25**depth) == pytest.approx(np.ones(20), abs=1e-14)
-    centre = np.zeros((20, 3))
-    np.add.at(centre, owner, 0.25 ** depth[:, None] * bary.mean(axis=1))
-    assert centre == pytest.approx(np.full((20, 3), 1 / 3), abs=1e-14)
-    for s, local, level, close in zip(owner, bary, depth, near, strict=True):
-        part = local @ x[s]
-        size = max(np.linalg.norm(part[i] - part[i - 1]) for i in range(3))
-        weights = np.linspace(0, 1, 101)
-        edge = [w * part[i] + (1 - w) * part[i - 1] for i in range(3) for w in weights]
-        away = min(np.linalg.norm(np.array(edge) - tip, axis=1).min() for tip in tips)
-        inside = [
-            (np.linalg.solve(np.vstack([part.T, np.ones(3)]), [*tip, 1]) >= 0).all() for tip in tips
-        ]
-        # The edges are sampled: what lies within a hundredth may be either.
-        if any(inside) or abs(size - away) > 0.01 * size:
-            assert close == (any(inside) or size > away)
-        assert level == 4 or not close
+    x, tips = rng.uniform(size=(40, 3, 2)), rng.uniform(size=(2, 2))
+    x[30:, 0] = tips[0]
+    bary = np.broadcast_to(np.eye(3), (40, 3, 3)).copy()
+    bears, fan = np.arange(40) >= 10, np.arange(40) >= 30
+    for levels, degree, is_conical in ((4, 2, False), (1, 12, True)):
+        number, place, weight = triangle_points(
+            bary, x, np.full(40, 0.5), bears, fan, tips, levels, *simplex_rule(2, 2),
+            *simplex_rule(2, degree), is_conical, *gauss(5), *gauss(8),
+        )  # fmt: skip
+        assert (np.diff(number) >= 0).all()
+        assert np.bincount(number, weight) == pytest.approx(np.full(40, 0.5), abs=1e-14)
+        # The integrals of a barycentric coordinate and of its square, as shares of the area.
+        for b in range(3):
+            first, second = (np.bincount(number, weight * place[:, b] ** p) for p in (1, 2))
+            assert first == pytest.approx(np.full(40, 1 / 6), abs=1e-14)
+            assert second == pytest.approx(np.full(40, 1 / 12), abs=1e-14)
+        # 1 / r over a triangle with the tip as a vertex, by the height h of the tip over the far
+        # side and the places t of its ends from the foot: h (asinh(t_2 / h) - asinh(t_1 / h)). It
+        # is exact along the radius; across, flat triangles leave the error of a Gauss rule.
+        r = np.linalg.norm(np.einsum("qb,qbd->qd", place, x[number]) - tips[0], axis=1)
+        along = x[30:, 2] - x[30:, 1]
+        length = np.linalg.norm(along, axis=1)
+        t = [((x[30:, k] - tips[0]) * along).sum(axis=1) / length for k in (1, 2)]
+        h = np.sqrt(((x[30:, 1] - tips[0]) ** 2).sum(axis=1) - t[0] ** 2)
+        exact = h * (np.arcsinh(t[1] / h) - np.arcsinh(t[0] / h))
+        own = np.bincount(number, weight / r)[30:] * h * length
+        assert own == pytest.approx(exact, rel=2e-4)
