@@ -6,6 +6,7 @@ alone (docs/add_a_load.md).
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import combinations
 from math import pi
 from typing import Annotated, Any, ClassVar
@@ -474,7 +475,7 @@ class point_force(Load):  # noqa: N801
                 "one force for all points, or one for each."
             )
 
-    @property
+    @cached_property
     def name(self) -> str:
         """What messages and reports call it."""
         if np.ndim(self.x) == 2 and len(self.x) > 1:  # type: ignore[arg-type]
@@ -514,7 +515,7 @@ class line_force(Load):  # noqa: N801
     f: Annotated[ArrayLike | Callable[..., ArrayLike], VectorField(unit=LINE_FORCE)]
     acts = frozenset({"point_force"})
 
-    @property
+    @cached_property
     def name(self) -> str:
         """What messages and reports call it."""
         return f"line_force({self.where!r}, {self.beside!r})"

@@ -1,6 +1,7 @@
 """What holds a body, or moves a part of it by a given way."""
 
 from dataclasses import dataclass
+from functools import cache, cached_property
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -30,7 +31,7 @@ class Condition(Declared):
         """The function that it is made by."""
         return type(self).__name__
 
-    @property
+    @cached_property
     def name(self) -> str:
         """What messages and reports call it: its function and place."""
         where = self.place
@@ -44,10 +45,9 @@ class Condition(Declared):
 
     def check_in(self, mesh: Mesh) -> None:
         """Raise where a vector has another dimension than the body, or a set is not there."""
-        for name, argument in arguments_of(type(self)).items():
+        for name in _vectors_of(type(self)):
             value = getattr(self, name)
-            vector = argument.rule is not None and argument.rule.is_vector
-            if vector and isinstance(value, np.ndarray | tuple):
+            if isinstance(value, np.ndarray | tuple):
                 if np.shape(value)[-1:] != (mesh.dim,):
                     raise ProblemError(
                         f"{self.kind}: {name} = {value_text(value)} does not suit a body in "
@@ -55,6 +55,13 @@ class Condition(Declared):
                     )
         if isinstance(self.place, str):
             facet_set(mesh, self.place, self.kind)
+
+
+@cache
+def _vectors_of(kind: type[Condition]) -> tuple[str, ...]:
+    """Arguments of a condition that are vectors."""
+    every = arguments_of(kind).items()
+    return tuple(name for name, one in every if one.rule is not None and one.rule.is_vector)
 
 
 class Support(Condition):
@@ -101,7 +108,7 @@ class fix(Support):  # noqa: N801 - it is used as a function
     holds = True
     is_uniform = True
 
-    @property
+    @cached_property
     def name(self) -> str:
         """What messages and reports call it."""
         base_name = super().name
