@@ -155,6 +155,7 @@ def _symmetric_points(dim: int, degree: int) -> tuple[Floats, Floats]:
     return lock(points / points.sum(axis=1, keepdims=True)), lock(total / total.sum())
 
 
+@lru_cache(maxsize=64)
 def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     """A rule exact for polynomials of the given degree: points `(q, d + 1)`, weights sum to 1.
 
@@ -162,11 +163,11 @@ def simplex_rule(dim: int, degree: int) -> tuple[Floats, Floats]:
     in 3D up to degree 7.
     """
     if degree <= 1:
-        return np.full((1, dim + 1), 1 / (dim + 1)), np.ones(1)
+        return lock(np.full((1, dim + 1), 1 / (dim + 1))), lock(np.ones(1))
     if degree == 2:
         a = {1: 0.5 - 0.5 / np.sqrt(3), 2: 1 / 6, 3: (5 - np.sqrt(5)) / 20}[dim]
         bary = np.full((dim + 1, dim + 1), a) + np.eye(dim + 1) * (1 - (dim + 1) * a)
-        return bary, np.full(dim + 1, 1 / (dim + 1))
+        return lock(bary), lock(np.full(dim + 1, 1 / (dim + 1)))
     for degree_of_rule in _RULES.get(dim, {}):
         if degree <= degree_of_rule:
             return _symmetric_points(dim, degree_of_rule)

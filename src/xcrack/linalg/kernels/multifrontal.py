@@ -757,7 +757,7 @@ def places_of_squares(order, rank, begin, height, is_packed, level):  # type: ig
 
 @kernel
 def unchanged_parts(fronts, previous):  # type: ignore[no-untyped-def]
-    """Parts whose entries and whose children's places are the same bits as before `(parts,)`.
+    """Parts whose entries and whose children's places are those of before `(parts,)`.
 
     Parameters
     ----------
@@ -768,7 +768,6 @@ def unchanged_parts(fronts, previous):  # type: ignore[no-untyped-def]
     first0, begin0, in_parent0, start0, row0, value0 = previous[:6]
     parts = len(order)
     is_unchanged = np.zeros(parts, dtype=np.bool_)
-    bits, bits0 = value.view(np.uint64), value0.view(np.uint64)
     for t in range(parts):
         k, b = first[t + 1] - first[t], begin[t + 1] - begin[t]
         if k != first0[t + 1] - first0[t] or b != begin0[t + 1] - begin0[t]:
@@ -784,7 +783,7 @@ def unchanged_parts(fronts, previous):  # type: ignore[no-untyped-def]
                     break
         if is_same:
             for i in range(count):
-                if row[low + i] != row0[low0 + i] or bits[low + i] != bits0[low0 + i]:
+                if row[low + i] != row0[low0 + i] or value[low + i] != value0[low0 + i]:
                     is_same = False
                     break
         p = order[t]

@@ -411,8 +411,10 @@ def _with_room(table, count, more):  # type: ignore[no-untyped-def]
     """A table with so many more rows than those in use, twice as long where it is too short."""
     if count + more <= len(table):
         return table
-    longer = np.empty((2 * (count + more), table.shape[1]))
-    longer[:count] = table[:count]
+    longer = np.empty((2 * (count + more), 5))
+    for q in range(count):
+        for k in range(5):
+            longer[q, k] = table[q, k]
     return longer
 
 
@@ -441,7 +443,9 @@ def _put_fan(table, count, number, vertex, corner, share, s, ws, t, wt):  # type
     bx, by = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
     a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
     angle = abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
-    sectors = max(int(math.ceil(angle / _SECTOR)), 1)
+    sectors = 1
+    while sectors * _SECTOR < angle:
+        sectors += 1
     table = _with_room(table, count, sectors * len(s) * len(t))
     end = 0.0
     for k in range(sectors):
@@ -462,19 +466,6 @@ def _put_fan(table, count, number, vertex, corner, share, s, ws, t, wt):  # type
 
 
 @kernel
-def _nearest_tip(corner, tips):  # type: ignore[no-untyped-def]
-    """Number of the tip nearest to the middle of a triangle."""
-    x = (corner[0, 0] + corner[1, 0] + corner[2, 0]) / 3
-    y = (corner[0, 1] + corner[1, 1] + corner[2, 1]) / 3
-    nearest, least = 0, np.inf
-    for k in range(len(tips)):
-        distance = math.hypot(x - tips[k, 0], y - tips[k, 1])
-        if distance < least:
-            nearest, least = k, distance
-    return nearest
-
-
-@kernel
 def _put_fans_around(  # type: ignore[no-untyped-def]
     table, count, number, vertex, corner, share, tip, s, ws, t, wt, fan, fan_corner
 ):
@@ -490,7 +481,8 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
             best, along, least = i, at, distance
     i, j, k = best, (best + 1) % 3, (best + 2) % 3
     for half in range(2):
-        part, second, third = (along, k, i) if half == 0 else (1 - along, j, k)
+        part = along if half == 0 else 1 - along
+        second, third = k if half == 0 else j, i if half == 0 else k
         if part <= 1e-14:
             continue
         for b in range(3):
@@ -504,31 +496,9 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _put_nearest_first(vertex, corner, tips):  # type: ignore[no-untyped-def]
-    """Sort the vertices of a triangle by their distance to the nearest tip.
-
-    A conical rule is not symmetric: with an order that geometry decides, points do not depend on
-    how nodes are numbered.
-    """
-    away, largest = np.empty(3), 0.0
-    for i in range(3):
-        away[i] = np.inf
-        for k in range(len(tips)):
-            distance = math.hypot(corner[i, 0] - tips[k, 0], corner[i, 1] - tips[k, 1])
-            away[i] = min(away[i], distance)
-        largest = max(largest, away[i])
-    for end in (2, 1):
-        for i in range(end):
-            if away[i + 1] < away[i] - _SAME * largest:
-                away[i], away[i + 1] = away[i + 1], away[i]
-                for b in range(3):
-                    vertex[i, b], vertex[i + 1, b] = vertex[i + 1, b], vertex[i, b]
-
-
-@kernel
 def triangle_points(  # type: ignore[no-untyped-def]
     bary, corners, share, bears_tip, fan, tips, levels, plain, plain_share, near, near_share,
-    is_conical, s, ws, t, wt,
+    s, ws, t, wt,
 ):  # fmt: skip
     """Integration points of triangles, denser towards tips where their functions act.
 
@@ -551,8 +521,6 @@ def triangle_points(  # type: ignore[no-untyped-def]
         Rule of triangles without tip functions.
     near, near_share : (p, 3) and (p,) arrays
         Rule of those with tip functions that lie away from tips.
-    is_conical : bool
-        It is not symmetric.
     s, ws, t, wt : (i,) and (j,) arrays
         Gauss rules of fans, along the radius and across.
 
@@ -583,7 +551,9 @@ def triangle_points(  # type: ignore[no-untyped-def]
                 stack[0, i, b] = 1.0 if i == b else 0.0
         while top > 0:
             top -= 1
-            level = depths[top]
+            level, own = depths[top], share[k]
+            for _ in range(level):
+                own *= 0.25
             for i in range(3):
                 for b in range(3):
                     part[i, b] = stack[top, i, b]
@@ -595,22 +565,19 @@ def triangle_points(  # type: ignore[no-untyped-def]
                         vertex[i, b] += part[i, v] * bary[k, v, b]
                     for j in range(2):
                         corner[i, j] += part[i, v] * corners[k, v, j]
-            size, is_close = _longest_side(corner), False
+            size, closest, least = _longest_side(corner), 0, np.inf
             for m in range(len(tips)):
-                # Equal lengths are common in regular meshes: round-off must not decide.
-                if size > (1.0 + _SAME) * _distance(tips[m, 0], tips[m, 1], corner):
-                    is_close = True
-                    break
-            if not is_close:
-                if is_conical:
-                    _put_nearest_first(vertex, corner, tips)
-                own = share[k] / 4.0**level
+                away = _distance(tips[m, 0], tips[m, 1], corner)
+                if away < least:
+                    closest, least = m, away
+            # Equal lengths are common in regular meshes: round-off must not decide.
+            if size <= (1.0 + _SAME) * least:
                 table, count = _put_rule(table, count, k, vertex, own, near, near_share)
                 continue
             if level == levels:
                 table, count = _put_fans_around(
-                    table, count, k, vertex, corner, share[k] / 4.0**level,
-                    tips[_nearest_tip(corner, tips)], s, ws, t, wt, one, one_corner,
+                    table, count, k, vertex, corner, own,
+                    tips[closest], s, ws, t, wt, one, one_corner,
                 )  # fmt: skip
                 continue
             for i in range(3):

@@ -369,7 +369,8 @@ def add_lips(  # type: ignore[no-untyped-def]
     steady : (s, 2, 2) array
         Initial stress at the tip in its frame.
     """
-    g, sigma, straight = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.eye(2)
+    g, sigma, straight = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.zeros((2, 2))
+    straight[0, 0] = straight[1, 1] = 1.0
     states, n = total.shape[0], len(xi)
     local = np.empty((2, 2, states))
     for p in range(n):
