@@ -45,7 +45,8 @@ class Condition(Declared):
 
     def check_in(self, mesh: Mesh) -> None:
         """Raise where a vector has another dimension than the body, or a set is not there."""
-        for name in _vectors_of(type(self)):
+        kind: Any = type(self)
+        for name in _vectors_of(kind):
             value = getattr(self, name)
             if isinstance(value, np.ndarray | tuple):
                 if np.shape(value)[-1:] != (mesh.dim,):
@@ -58,7 +59,7 @@ class Condition(Declared):
 
 
 @cache
-def _vectors_of(kind: type[Condition]) -> tuple[str, ...]:
+def _vectors_of(kind: Any) -> tuple[str, ...]:
     """Arguments of a condition that are vectors."""
     every = arguments_of(kind).items()
     return tuple(name for name, one in every if one.rule is not None and one.rule.is_vector)
