@@ -178,5 +178,5 @@ def test_points_of_triangles_near_tips():
         t = [((x[30:, k] - tips[0]) * along).sum(axis=1) / length for k in (1, 2)]
         h = np.sqrt(((x[30:, 1] - tips[0]) ** 2).sum(axis=1) - t[0] ** 2)
         exact = h * (np.arcsinh(t[1] / h) - np.arcsinh(t[0] / h))
-        own = np.bincount(number, weight / r)[30:] * h * length
-        assert own == pytest.approx(exact, rel=2e-4)
+        integral = np.bincount(number, weight / r)[30:] * h * length
+        assert integral == pytest.approx(exact, rel=2e-4)

@@ -551,9 +551,9 @@ def triangle_points(  # type: ignore[no-untyped-def]
                 stack[0, i, b] = 1.0 if i == b else 0.0
         while top > 0:
             top -= 1
-            level, own = depths[top], share[k]
+            level, fraction = depths[top], share[k]
             for _ in range(level):
-                own *= 0.25
+                fraction *= 0.25
             for i in range(3):
                 for b in range(3):
                     part[i, b] = stack[top, i, b]
@@ -572,11 +572,11 @@ def triangle_points(  # type: ignore[no-untyped-def]
                     closest, least = m, away
             # Equal lengths are common in regular meshes: round-off must not decide.
             if size <= (1.0 + _SAME) * least:
-                table, count = _put_rule(table, count, k, vertex, own, near, near_share)
+                table, count = _put_rule(table, count, k, vertex, fraction, near, near_share)
                 continue
             if level == levels:
                 table, count = _put_fans_around(
-                    table, count, k, vertex, corner, own,
+                    table, count, k, vertex, corner, fraction,
                     tips[closest], s, ws, t, wt, one, one_corner,
                 )  # fmt: skip
                 continue
