@@ -2,10 +2,24 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 
-from xcrack import Isotropic, Numerics, Problem, box, line_crack, plate, solve, traction
+from support import exact
+from support import scenes_2d as scenes
+from xcrack import (
+    Isotropic,
+    Numerics,
+    Problem,
+    box,
+    displacement,
+    line_crack,
+    plate,
+    solve,
+    traction,
+)
 from xcrack.analysis.multipliers import multipliers
 from xcrack.fem.system import build
+from xcrack.verification.exact.closed import partial_closure_pressure
 
 SXX, SYY, TXY = -100.0, -60.0, 10.0
 SIDES = [
@@ -55,6 +69,32 @@ def test_pressure_of_an_arc_on_a_finer_mesh():
     mean, largest = error_on_an_arc(100, 48)
     assert mean < 0.004
     assert largest < 0.03
+
+
+def test_pressure_at_the_end_of_contact():
+    """A root ends there: the pressure is as near as any of the functions of the mesh can be.
+
+    Discretisation: .10 of the largest pressure, of which the best function leaves .08; .03 from a
+    cell away from the end on.
+    """
+    a, mean = 0.5, 0.2
+    values = scenes.turned(
+        lambda x, y: exact.partial_closure(x, y, a, 1.0, 0.3, mean, 1.0), np.zeros(2), 0.0
+    )
+    problem = Problem(
+        scenes.perturbed(20, 641, 0.1), Isotropic(1.0, 0.3, "strain"),
+        [line_crack([(-a, 0.0), (a, 0.0)])],
+        [displacement("boundary", lambda x: values(x)[0])], order=2,
+    )  # fmt: skip
+    solution = solve(problem, error=True)
+    contact, shapes = solution.contact[0], solution.factored.contact.spaces[0].values.toarray()
+    x, weight = contact.points[:, 0], np.sqrt(contact.measure)
+    wanted = partial_closure_pressure(x, a, mean, 1.0)
+    fit = shapes @ nnls(shapes * weight[:, None], wanted * weight)[0]
+    off, of_fit = (np.abs(p - wanted) / wanted.max() for p in (contact.pressure, fit))
+    assert off.max() < 1.1 * of_fit.max()
+    assert off.max() < 0.12
+    assert off[np.abs(x - x[wanted > 0].max()) > 0.1].max() < 0.04
 
 
 def count(points, kind):

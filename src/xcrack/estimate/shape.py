@@ -1,4 +1,4 @@
-"""What a shape that the mesh or the cut misses does to functionals, to first order.
+"""What a shape that the mesh or the cut misses, and faces that overlap, do to functionals.
 
 Where the boundary of the model must move outward by delta, a functional with the dual solution z
 changes by -int delta sigma(u) : eps(z) ds on boundaries free of traction (the shape derivative of
@@ -6,11 +6,13 @@ an energy product; Sokolowski and Zolésio, 1992).
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from xcrack.analysis.solution import Solution, fields_at, gradients_at
-from xcrack.base.arrays import Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.crack.crack import turns
 from xcrack.estimate.estimate import Estimate, pressure_on
 from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, lip_side
@@ -24,6 +26,13 @@ _ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
 # a turn of so many rad on (measured: half of what a kink of 1 rad changes is of first order).
 _STRETCH = 4.0
 _OPEN, _SMOOTH, _KINK, _BLUNT = 0.1, 0.2, 0.9, 0.5
+# Turns of a polyline (rad) at which faces under pressure lock, if both legs are so many cells long;
+# within a reach, in cells, of them or of a junction, gaps of closed faces are theirs.
+_LOCKS, _LEG, _REACH = 0.03, 0.4, 1.5
+# Change of a functional over E / h times the product of both gaps, at turns, where its sign is
+# known; half-widths over the absolute products at turns, at junctions, and elsewhere.
+_AT_TURNS = -1.6
+_GAPS = (1.0, 2.0, 0.385)
 
 
 def crack_shape(
@@ -102,6 +111,94 @@ def crack_shape(
     doubt += _OPEN * np.abs(smooth_parts[~has_traction]).sum(axis=0)
     doubt += (_SMOOTH + _KINK) * np.einsum("q,qkm->km", bluntness, np.abs(parts))
     return parts.sum(axis=0), doubt
+
+
+@dataclass(frozen=True, eq=False)
+class GapChanges:
+    """What the gaps that closed faces have between their pressures' functions do to functionals.
+
+    Attributes
+    ----------
+    change : (states, m) array
+        Signed, of gaps where faces turn: they lock there, and slide too far on coarse cells.
+    bar : (states, m) array
+        Half-width of what all gaps do.
+    by_cell : (states, m, cells) array
+        Absolute contributions of cells.
+    """
+
+    change: Floats
+    bar: Floats
+    by_cell: Floats
+
+
+def gap_changes(
+    solutions: Sequence[Solution],
+    estimated: Estimate,
+    c: int,
+    singular: Callable[[], tuple[Floats, Floats]],
+) -> GapChanges:
+    """What finer pressures on closed faces would change.
+
+    Faces that are closed in the mean of each pressure function have gaps g of either sign in
+    between. A pressure of the size E g / h, h the cell, would close them; it changes a functional
+    by its product with the gap of the dual solution, to a factor that is measured.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    estimated : Estimate
+    c : int
+        Crack of the functionals.
+    singular : callable
+        As of `crack_shape`; called where faces are closed.
+    """
+    space, m = solutions[0].space, estimated.z.shape[2]
+    places = np.array([j.x for j in solutions[0].problem.junctions]).reshape(-1, 2)
+    change, by_zone = np.zeros((len(solutions), m)), np.zeros((3, len(solutions), m))
+    by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
+    for k, solution in enumerate(solutions):
+        for other, contact in enumerate(solution.contact):
+            if contact is None or contact.shear is not None:
+                continue
+            rows = np.nonzero(np.asarray(contact.closed) & (np.asarray(contact.pressure) > 0))[0]
+            if not len(rows):
+                continue
+            lips = solution.lips[other]
+            cell, x = lips.cell[rows, 0], lips.x[rows]
+            size = space.mesh.cell_size[cell]
+            gap = np.zeros((len(rows), 1 + m))
+            for s, sign in ((0, -1), (1, 1)):
+                side = lip_side(space, other, lips.cell[rows, s], lips.bary[rows, s], sign)
+                columns = _columns([solution], estimated.z[[k]])
+                u, _ = fields_at(space, columns, lips.cell[rows, s], lips.bary[rows, s], side)
+                if other == c:
+                    u[..., 1:] -= singular()[0][s, rows]
+                gap += sign * np.einsum("qi,qim->qm", lips.normal[rows], u)
+            modulus = solution.problem.elasticity.moduli_of_cells[cell]
+            part = (modulus * lips.weight[rows] / size * gap[:, 0])[:, None] * gap[:, 1:]
+            bends = _locking_points(space.cracks[other].points, float(size.mean()))
+            at_junction = _is_near(x, places, _REACH * size)
+            at_turn = _is_near(x, bends, _REACH * size) & ~at_junction
+            change[k] += _AT_TURNS * part[at_turn].sum(axis=0)
+            for zone, among in enumerate((at_turn, at_junction, ~at_turn & ~at_junction)):
+                by_zone[zone, k] += np.abs(part[among]).sum(axis=0)
+            np.add.at(by_cell[k].T, cell, np.abs(part))
+    factor = np.array(_GAPS)[:, None, None]
+    return GapChanges(change, np.sqrt(((factor * by_zone) ** 2).sum(axis=0)), by_cell)
+
+
+def _locking_points(points: Floats, size: float) -> Floats:
+    """Points of a polyline where it turns between legs that cells resolve `(k, 2)`."""
+    leg = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    locks = (turns(points) > _LOCKS) & (np.minimum(leg[1:], leg[:-1]) > _LEG * size)
+    return np.asarray(points[1:-1][locks])
+
+
+def _is_near(x: Floats, places: Floats, reach: Floats) -> Bools:
+    """Whether points are within a reach of one of some places `(q,)`."""
+    away = np.linalg.norm(x[:, None] - places, axis=2).min(axis=1, initial=np.inf)
+    return np.asarray(away < reach)
 
 
 def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]:

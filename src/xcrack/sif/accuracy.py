@@ -1,4 +1,4 @@
-"""Warnings about the accuracy of K; their thresholds come from measured errors."""
+"""Doubts and warnings about the accuracy of K; their thresholds come from measured errors."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.analysis.solution import Solution
-from xcrack.base.arrays import Floats
+from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.measures import cells_deep
 from xcrack.sif.common import is_shallow, pressure_at
@@ -16,6 +16,10 @@ _LOAD = 0.1  # share of K of the mean stress of the body that counts where K is 
 _SHARP = 1.9  # cells: two, but for the scatter of their sizes along a front
 BESIDE = 1.0  # cells to another material: K is .2 % off from there on, 10 % at .06 (measured)
 _ZONE = 2.0  # cells; in shorter contact zones the pressure is hardly more than one number
+# Share of the largest K of a crack that its estimated error and bar may have without a warning: of
+# drawn scenes that are off by more than 5 % nearly all are beyond it, of the others one in twelve.
+_OFF = 0.03
+_NOTHING = 0.01  # share of K of the mean stress of the body below which K of a crack is nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +78,9 @@ def check(
     domain: Domain,
     parts: Sequence[SIF],
     disagree: Callable[[], bool] = lambda: True,
-) -> None:
-    """Warn of clipped domains, bends within two cells, domains that differ, short contact zones.
+    depart: Callable[[], bool] = lambda: True,
+) -> list[str]:
+    """Doubts: clipped domains, bends within two cells, domains that differ, short contact zones.
 
     Parameters
     ----------
@@ -88,7 +93,14 @@ def check(
         One for each state, with at least one row.
     disagree : callable () -> bool
         Whether K by other means is another one: a doubt about the domain, or a short contact zone,
-        is no warning where it is not.
+        is none where it is not.
+    depart : callable () -> bool
+        Whether it is quite another one: so for another material beside the tip.
+
+    Returns
+    -------
+    list of str
+        Messages, each with its place.
 
     Raises
     ------
@@ -118,19 +130,62 @@ def check(
     sharp = _sharp_bend(domain)
     if sharp and domain.bend_at is not None:
         doubts, place = [sharp, *doubts], domain.bend_at
-    if domain.interface < BESIDE * domain.size:
-        warn(
+    messages = []
+    if domain.interface < BESIDE * domain.size and depart():
+        messages.append(
             f"{domain.at(tip.x if tip.x.ndim == 1 else place)}: another material begins "
-            f"{domain.interface / domain.size:.2g} cells away. Errors of K of 1 % are common "
-            "there, and two domains do not show them. Refine the mesh there, or move the crack."
+            f"{domain.interface / domain.size:.2g} cells away. Errors of K of some per cent are "
+            "common there, and two domains do not show them. Refine the mesh there, or move the "
+            "crack."
         )
     if any(doubts):
-        warn(f"{domain.at(place)}: {'; '.join(filter(None, doubts))}. Refine the mesh there.")
+        text = "; ".join(filter(None, doubts))
+        messages.append(f"{domain.at(place)}: {text}. Refine the mesh there.")
     for solution, part, scale in zip(solutions, parts, scales, strict=True):
         words = _short_zone(solution, tip.crack, domain, part, scale)
         if words and disagree():
-            warn(words)
+            messages.append(words)
             break
+    return messages
+
+
+def warn_of(
+    messages: Sequence[str], solutions: Sequence[Solution], parts: Sequence[SIF], radius: float
+) -> None:
+    """Warn of doubts about K of a crack; where it has bars at all of its tips these decide.
+
+    Parameters
+    ----------
+    messages : sequence of str
+        Of `check`, for all tips.
+    solutions : sequence of Solution
+        States of one problem.
+    parts : sequence of SIF
+        K of the crack in each, with bars or without.
+    radius : float, length
+        Enriched radius.
+    """
+    if any(np.isnan(part.bar).any() for part in parts):
+        for message in messages:
+            warn(message)
+        return
+    worst, text = _OFF, ""
+    for solution, part in zip(solutions, parts, strict=True):
+        off = np.abs(part.eta) + part.bar
+        off[part.closed, 0] = 0.0  # K_I is exact there
+        largest = float(np.abs(part.K).max(initial=0.0))
+        scale = max(largest, _NOTHING * _K_of_mean_stress(solution, part, radius))
+        if not off.size or off.max() <= worst * scale:
+            continue
+        worst = float(off.max()) / scale
+        row, mode = np.unravel_index(off.argmax(), off.shape)
+        text = (
+            f"K at {at(part.x[row])}: {('K_I', 'K_II')[mode]} = {part.K[row, mode]:.4g} is off by "
+            f"{part.eta[row, mode]:.2g} ± {part.bar[row, mode]:.2g} by its estimate, up to "
+            f"{100 * worst:.2g} % of the largest K of the crack. Refine the mesh there"
+        )
+    if text:
+        warn(". ".join([text, *(message.rstrip(".") for message in messages)]) + ".")
 
 
 # Cells by which a crack must be deep at order 1 in 3D: K is up to 4.7 % low below, within 2 % above
@@ -160,10 +215,15 @@ def scale_of(solution: Solution, part: SIF, radius: float) -> float:
     K of a closed or shielded tip may be zero: what counts there is K of the body's mean stress at a
     crack as long as the enriched radius.
     """
+    return max(float(np.abs(part.K).max()), _LOAD * _K_of_mean_stress(solution, part, radius))
+
+
+def _K_of_mean_stress(solution: Solution, part: SIF, radius: float) -> float:
+    """K of the root mean square of the body's stress at a crack of some length."""
     volume = float(solution.space.mesh.volume.sum())
-    E_prime = 1.0 if part.E_prime is None else float(part.E_prime.max())
+    E_prime = 1.0 if part.E_prime is None else float(part.E_prime.max(initial=0.0))
     mean_stress = np.sqrt(2 * max(solution.energy, 0.0) * E_prime / volume)
-    return max(float(np.abs(part.K).max()), _LOAD * float(mean_stress * np.sqrt(np.pi * radius)))
+    return float(mean_stress * np.sqrt(np.pi * radius))
 
 
 def _clipped_K(domain: Domain) -> str:

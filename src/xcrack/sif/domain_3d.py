@@ -192,7 +192,8 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
             if free[e]
         )
         result.append(replace(sif, ends=known))
-    check(solutions, t, values.domain, result)
+    for message in check(solutions, t, values.domain, result):
+        warn(message)
     warn_of_changes(materials, curve, passes)
     return result
 

@@ -12,10 +12,10 @@ from xcrack.base.checks import sound_copy, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.machine import threads
 from xcrack.model.material import Material
-from xcrack.sif.accuracy import warn_of_order
+from xcrack.sif.accuracy import warn_of, warn_of_order
 from xcrack.sif.domain_2d import tip_intensities
 from xcrack.sif.domain_3d import front_intensity
-from xcrack.sif.error import with_bars
+from xcrack.sif.error import doubts_at_kinks, with_bars
 from xcrack.sif.sif import SIF, joined_sif
 
 _CrackNumber = Annotated[int, Whole()]
@@ -51,10 +51,12 @@ def stress_intensity(solution: Solution, crack: _CrackNumber = 0, error: _Bars =
     Warns
     -----
     XcrackWarning
-        A domain with too little room for small errors; two domains that differ by more than 1 % of
-        K at a tip, or by 5 % of the largest K in the mean of a front; a contact zone at a tip or
-        front that is shorter than two cells; a front too short for K, or whose radius of curvature
-        is below two cells; a crack in 3D that is less than five cells of order 1 deep.
+        In 2D with bars: an error of more than 3 % of the largest K of the crack by its estimate and
+        bar. Without: a domain with too little room for small errors; two domains that differ by
+        more than 1 % of K at a tip, or by 5 % of the largest K in the mean of a front; a contact
+        zone at a tip or front that is shorter than two cells; faces that press at a kink which the
+        cut rounds off; a front too short for K, or whose radius of curvature is below two cells; a
+        crack in 3D that is less than five cells of order 1 deep.
     """
     if not isinstance(solution, Solution):
         hint = ""
@@ -111,25 +113,28 @@ def stress_intensities(
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
     live = [s for s in solutions if not s.at_rest] or solutions[:1]
     ends = space.tips_of(crack)
+    doubts: list[str] = []
     with threads(solutions[0].problem.numerics.threads):
-        by_end = (
-            tip_intensities(live, ends)
-            if space.dim < 3
-            else [front_intensity(live, t) for t in ends]
-        )
+        if space.dim < 3:
+            by_end, doubts = tip_intensities(live, ends)
+        else:
+            by_end = [front_intensity(live, t) for t in ends]
     by_state = [joined_sif([states[k] for states in by_end], space.dim) for k in range(len(live))]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     result = [
         _without_K(by_state[0]) if s.at_rest else by_state[k]
         for s, k in zip(solutions, place, strict=True)
     ]
-    if isinstance(error, str) and error == "front":
-        return with_bars(solutions, result, crack, error)
     if error is None:
         error = any(s.factored is not None for s in solutions)
     if error:
-        return with_bars(solutions, result, crack)
-    warn_of_order(live[0], crack)
+        result = with_bars(solutions, result, crack, error if isinstance(error, str) else "")
+    else:
+        warn_of_order(live[0], crack)
+    if space.dim < 3 and len(ends):
+        doubts = [*doubts, *doubts_at_kinks(live, crack)]
+        parts = [sif for sif, s in zip(result, solutions, strict=True) if not s.at_rest]
+        warn_of(doubts, live, parts or result[:1], space.tips[ends[0]].radius)
     return result
 
 
