@@ -32,7 +32,7 @@ _LOCKS, _LEG, _REACH = 0.03, 0.4, 1.5
 # Change of a functional over E / h times the product of both gaps, at turns, where its sign is
 # known; half-widths over the absolute products at turns, at junctions, and elsewhere.
 _AT_TURNS = -1.6
-_GAPS = (1.0, 2.0, 0.385)
+_GAPS = (1.0, 1.9, 0.38)
 
 
 def crack_shape(
