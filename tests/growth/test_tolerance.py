@@ -191,13 +191,13 @@ def test_mesh_is_refined_at_the_first_step_that_needs_it(tmp_path, monkeypatch):
     With a stricter rule: so close to the begin all errors together never are above the tolerance.
     """
     monkeypatch.setattr(mesh_cells, "_WHOLE", 0.3)
-    given = run_of(strip(5), tolerance=5e-4)
+    given = run_of(strip(5), tolerance=4e-4)
     whole = xc.collect(xc.grow(**given, max_steps=3), tmp_path / "whole")
     assert [step.run.meshes for step in whole.steps] == [0, 1, 1]
     cells = [len(step.solutions[0].problem.mesh.cells) for step in whole.steps]
     assert cells[0] < min(cells[1:])
     # What K may take of the tolerance, for bars that hold for almost all single K.
-    assert whole.steps[1].error.rate < 0.4 / 0.5 * 5e-4 < whole.steps[0].error.rate
+    assert whole.steps[1].error.rate < 0.4 / 0.5 * 4e-4 < whole.steps[0].error.rate
     other = resumed(tmp_path / "part", given, whole, (1, 2))
     assert content(tmp_path / "part") == content(tmp_path / "whole")
     assert len(other.mesh.cells) == len(xc.load(tmp_path / "whole").mesh.cells) == cells[-1]
