@@ -85,7 +85,7 @@ def run(n: int) -> None:
         chosen = multipliers(V, 0, lips[0], "reduced")
         N = gap_rows(chosen, lips[0], jump_matrix(V, 0, lips[0]))
         rows = ContactRows(N, chosen.measure, body.largest_modulus * n / 2, True)
-        engine.contact(rows, f, np.zeros_like(f), [None], opened=u)
+        engine.contact(rows, f, np.zeros_like(f), [None], u_opened=u)
     solution = xc.solve(problem)
     with part("K"):
         xc.stress_intensity(solution)

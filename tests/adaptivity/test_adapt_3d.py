@@ -197,8 +197,8 @@ def test_a_front_without_finer_cells_keeps_its_bars():
     """Its K has not changed because its cells have not: that is no small error."""
     x = np.linspace(0, 1, 5)
     before, now = intensity(x, x * 0 + 0.02), intensity(x, x * 0 + 0.03)
-    assert np.allclose(sizes_3d._shorten_errors(now, before, finer=False).bar, 0.02)
-    assert (sizes_3d._shorten_errors(now, before, finer=True).bar == 0).all()
+    assert np.allclose(sizes_3d._shorten_errors(now, before, is_finer=False).bar, 0.02)
+    assert (sizes_3d._shorten_errors(now, before, is_finer=True).bar == 0).all()
 
 
 def test_places_beside_a_free_surface_do_not_count():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.growth.front_filter import corrected, predicted, response, turning_of
+from xcrack.growth.front_filter import corrected_advance, predicted_advance, response, turning_of
 
 M = 3.0
 
@@ -31,9 +31,9 @@ def grown(closed, number, steps, total=2.0):
     for _ in range(steps):
         advance = da * (1 - 0.5 * M * k * height * wave)
         front = response(s, advance, M, turning, closed, length)
-        after = height * wave + predicted(front, s, advance) - da
+        after = height * wave + predicted_advance(front, s, advance) - da
         later = da * (1 - 0.5 * M * k * (after @ wave) / (wave @ wave) * wave)
-        end = height * wave + corrected(front, s, advance, later) - da
+        end = height * wave + corrected_advance(front, s, advance, later) - da
         height = (end @ wave) / (wave @ wave)
     return height, 0.01 * np.exp(-0.5 * M * k * total)
 
@@ -62,11 +62,11 @@ def test_what_a_filter_leaves_alone(closed):
     s, length = places(closed)
     even = np.full(len(s), 0.3)
     front = response(s, even, M, 2 * np.pi * closed, closed, length)
-    assert predicted(front, s, even) == pytest.approx(even, abs=1e-12)
-    assert corrected(front, s, even, even) == pytest.approx(even, abs=1e-12)
+    assert predicted_advance(front, s, even) == pytest.approx(even, abs=1e-12)
+    assert corrected_advance(front, s, even, even) == pytest.approx(even, abs=1e-12)
     partly = np.where(s < 5, 0.3, 0.0)
     front = response(s, partly, M, 0.0, closed, length)
-    way = predicted(front, s, partly)
+    way = predicted_advance(front, s, partly)
     assert (way >= 0).all()
     assert way[(s > 7) & (s < 11)] == pytest.approx(0, abs=1e-12)
 
@@ -76,16 +76,16 @@ def test_a_circle_and_its_shift_stay():
     s, length = places(True)
     shift = 0.3 * (1 + 0.1 * np.cos(2 * np.pi * s / length))
     front = response(s, shift, M, 2 * np.pi, True, length)
-    assert predicted(front, s, shift) == pytest.approx(shift, abs=1e-5)
+    assert predicted_advance(front, s, shift) == pytest.approx(shift, abs=1e-5)
 
 
 def test_later_rates_enter_by_half_where_nothing_responds():
     s, length = places(False)
     one, two = np.full(len(s), 0.1), np.full(len(s), 0.2)
     front = response(s, one, M, 0.0, False, length)
-    assert corrected(front, s, one, two) == pytest.approx(np.full(len(s), 0.15), abs=1e-12)
+    assert corrected_advance(front, s, one, two) == pytest.approx(np.full(len(s), 0.15), abs=1e-12)
     assert response(s[:3], one[:3], M, 0.0, False, length) is None
-    assert corrected(None, s, one, two) == pytest.approx(np.full(len(s), 0.15))
+    assert corrected_advance(None, s, one, two) == pytest.approx(np.full(len(s), 0.15))
 
 
 def test_turning_of_an_arc():

@@ -229,13 +229,13 @@ def test_the_linear_ratio_is_of_first_order_only():
 def test_steps_for_a_tolerance():
     """A rule of second order whose error is c h²: the steps settle where it is the tolerance."""
     c, tolerance = 2.0, 1e-2
-    h, before = first_length(1.0, tolerance, least=1e-3), None
+    h, before = first_length(1.0, tolerance, least_length=1e-3), None
     for _ in range(12):
         error = step_error(c * h**3, h, 0.0, 1.0, 0.0, tolerance)
-        h, before = next_length(h, error, before, least=1e-3), error
+        h, before = next_length(h, error, before, least_length=1e-3), error
     assert step_error(c * h**3, h, 0.0, 1.0, 0.0, tolerance) == pytest.approx(0.95**2.5, abs=0.03)
-    assert first_length(1.0, 1e-4, least=0.2) == 0.2
-    assert next_length(1.0, 1e6, 1.0, least=0.6) == 0.6
+    assert first_length(1.0, 1e-4, least_length=0.2) == 0.2
+    assert next_length(1.0, 1e6, 1.0, least_length=0.6) == 0.6
     assert step_error(0.0, 1.0, 0.0, 1.0, 0.0, 1e-2) == 1e-3
     assert step_error(0.0, 1.0, 0.02, 1.0, 0.0, 1e-2) == 2.0  # 2 % of the life of the step
     assert step_error(0.0, 1.0, 0.02, 1.0, 100.0, 1e-2) == pytest.approx(2 / 15)  # of a long life

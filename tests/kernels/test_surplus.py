@@ -118,7 +118,7 @@ def test_functionals_on_surplus_functions():
     w = surplus(space, np.zeros(space.n_dof, dtype=bool))
     points = cell_points(space, space.enriched[::3], 2, 2)
     factor = np.random.default_rng(743).normal(size=(len(points.cell), 2, 2, 2))
-    result = np.zeros((len(w.fixed), 2, 2))
+    result = np.zeros((len(w.is_fixed), 2, 2))
     add_functional(result, points.cell, points.bary, points.side, factor, *w.arrays)
     _, by_bary = polynomials(points.bary, w.sign[points.cell])
     slope = np.einsum("qab,qbj->qaj", by_bary, space.mesh.gradient[points.cell])

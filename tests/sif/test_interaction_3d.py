@@ -23,7 +23,7 @@ from xcrack.sif.interaction_3d import (
     front_nodes,
     hats,
     lip_integrals,
-    means,
+    mean_integrals,
     reading,
     solve_front,
 )
@@ -64,7 +64,7 @@ def even(distance):
 
 def means_of(curve, knots, I, material):
     """K as means over the hats (p, 3)."""
-    return means(I[:, 0], knots, curve, material)[0]
+    return mean_integrals(I[:, 0], knots, curve, material)[0]
 
 
 def computed_with(curve, knots, displacement, radius, *, curved=True):
@@ -75,7 +75,7 @@ def computed_with(curve, knots, displacement, radius, *, curved=True):
     feet = curve.feet(x)
     radii = np.full((len(knots), 1), radius)
     total = domain_integrals(
-        curve, knots, feet, weight, gradient, side, behind, STEEL, radii, curved=curved
+        curve, knots, feet, weight, gradient, side, behind, STEEL, radii, is_curved=curved
     )
     return means_of(curve, knots, total, STEEL)
 
@@ -204,17 +204,17 @@ def test_a_smooth_field_has_no_K_on_a_twisted_front(prestressed):
     side, behind = np.where(theta > 0, 1, -1), np.abs(theta) > np.pi / 2
     feet, gradient = curve.feet(x), smooth_gradient(x)[..., None]
     args = (curve, knots, feet, weight, gradient, side, behind, material, radii)
-    options = {"force": force[..., None], "initial": initial}
+    options = {"force": force[..., None], "initial_stress": initial}
     body = domain_integrals(*args, **options)[0, 0, :, 1:-1]
     both = np.stack([smooth_gradient(lips)[..., None]] * 2)
     traction = -np.einsum("qij,qj->qi", total, normal)[..., None]
     lip = lip_integrals(
         curve, knots, curve.feet(lips), normal, area, traction, material, radii,
-        gradient=both, initial=initial,
+        gradient=both, initial_stress=initial,
     )[0, 0, :, 1:-1]  # fmt: skip
     scale = np.abs(lip).max(axis=1)
     assert (np.abs(body + lip).max(axis=1) < 3e-6 * scale).all()
-    straight = domain_integrals(*args, curved=False, **options)[0, 0, :, 1:-1]
+    straight = domain_integrals(*args, is_curved=False, **options)[0, 0, :, 1:-1]
     assert (np.abs(straight + lip).max(axis=1) > 0.05 * scale).all()
 
 

@@ -88,80 +88,96 @@ def adapt(
     A bar knows nothing of a wrong load, and of a body that is not linear elastic. The rule by which
     cells are refined is that of equal shares (Becker and Rannacher, 2001, Acta Numerica 10, 1).
     """
-    most = _MOST_UNKNOWNS[problem.mesh.dim] if max_unknowns is None else max_unknowns
+    most_unknowns = _MOST_UNKNOWNS[problem.mesh.dim] if max_unknowns is None else max_unknowns
     problem = resolved_problem(problem)
     _check_scene(problem)
     load_states = [None] if states is None else states
     scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem, tolerance), order=_ORDER)
-    return _adaptation_passes(scene, load_states, tolerance, most, progress)
+    return _adaptation_passes(scene, load_states, tolerance, most_unknowns, progress)
 
 
 def _adaptation_passes(
     scene: Problem,
     states: Sequence[Any],
     tolerance: float,
-    most: int,
+    most_unknowns: int,
     progress: bool | str,
 ) -> Adaptation:
     rounds: list[AdaptationPass] = []
-    current, messages = _measure_pass(scene, states, None, rounds)
-    if rounds[0].unknowns > most:
+    measured_pass, messages = _measure_pass(scene, states, None, rounds)
+    if rounds[0].unknowns > most_unknowns:
         raise ProblemError(
-            f"adapt: max_unknowns = {most}, and the first mesh, in which every crack is a few "
-            f"cells long, has {rounds[0].unknowns}: allow more."
+            f"adapt: max_unknowns = {most_unknowns}, and the first mesh, in which every crack is a "
+            f"few cells long, has {rounds[0].unknowns}: allow more."
         )
     aim, reason = _AIM, ""
     while True:
         _tell_progress(progress, len(rounds) - 1, rounds[-1])
         # Estimates are blind to parts of contact: there, two meshes have to agree.
-        met = current.error <= tolerance and (len(rounds) > 1 or not current.pressed)
-        if met:
+        has_met = measured_pass.error <= tolerance and (
+            len(rounds) > 1 or not measured_pass.pressed_cracks
+        )
+        if has_met:
             break
         if len(rounds) == _MOST_ROUNDS[scene.mesh.dim]:
             reason = f"{len(rounds)} rounds have not been enough"
             break
-        if not current.K.any():
+        if not measured_pass.K.any():
             break  # at rest, or shut everywhere: no cell brings K, nor a scale for its error
-        mesh = _NEXT[scene.mesh.dim](current, tolerance, aim, most)
+        mesh = _NEXT[scene.mesh.dim](measured_pass, tolerance, aim, most_unknowns)
         if mesh is None:
             reason = (
-                f"the next mesh would have more than {most} unknowns: allow more with max_unknowns"
+                f"the next mesh would have more than {most_unknowns} unknowns: allow more with "
+                "max_unknowns"
             )
             break
         try:
-            new, messages = _measure_pass(replace(scene, mesh=mesh), states, current, rounds)
+            next_pass, messages = _measure_pass(
+                replace(scene, mesh=mesh), states, measured_pass, rounds
+            )
         except GeometryError as error:
             reason = f"the crack does not fit into a finer mesh ({error})"
             break
         except SizeError as error:
             reason = f"a finer mesh needs more memory than is free ({error})"
             break
-        if new.error > _STALLED * current.error:
+        if next_pass.error > _STALLED * measured_pass.error:
             aim /= 2
-        current = new
+        measured_pass = next_pass
     for message in messages:
         warn(message)
-    zero = "" if np.abs(current.K).max(initial=0.0) > 0 else "K is zero at every tip"
-    parts = [part for part in (reason, current.worst, *current.reasons, zero) if part]
-    reason = "" if met else "; ".join(parts)
+    zero = "" if np.abs(measured_pass.K).max(initial=0.0) > 0 else "K is zero at every tip"
+    parts = [part for part in (reason, measured_pass.worst, *measured_pass.reasons, zero) if part]
+    reason = "" if has_met else "; ".join(parts)
     return Adaptation(
-        current.problem, current.solutions, current.sifs, tolerance, met, reason, tuple(rounds)
+        measured_pass.problem,
+        measured_pass.solutions,
+        measured_pass.sifs,
+        tolerance,
+        has_met,
+        reason,
+        tuple(rounds),
     )
 
 
 def _measure_pass(
-    scene: Problem, states: Sequence[Any], old: Indicators | None, rounds: list[AdaptationPass]
+    scene: Problem,
+    states: Sequence[Any],
+    last_indicators: Indicators | None,
+    rounds: list[AdaptationPass],
 ) -> tuple[Indicators, list[str]]:
     """A round, added to the list of them, and what it warned of."""
     messages: list[str] = []
     start = perf_counter()
     with collected_warnings(messages):
-        new = _TRUSTED[scene.mesh.dim](indicators_of(scene, states), old)
-    unknowns, seconds = new.solutions[0].space.n_dof, perf_counter() - start
+        indicators = _TRUSTED[scene.mesh.dim](indicators_of(scene, states), last_indicators)
+    unknowns, seconds = indicators.solutions[0].space.n_dof, perf_counter() - start
     rounds.append(
-        AdaptationPass(len(scene.mesh.cells), unknowns, new.K, new.bar, new.scale, seconds)
+        AdaptationPass(
+            len(scene.mesh.cells), unknowns, indicators.K, indicators.bar, indicators.scale, seconds
+        )
     )
-    return new, messages
+    return indicators, messages
 
 
 def _tell_progress(progress: bool | str, number: int, row: AdaptationPass) -> None:

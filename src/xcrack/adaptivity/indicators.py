@@ -93,7 +93,7 @@ class Indicators:
         return f"bars are longest at {at(x)} of crack {c}"
 
     @property
-    def pressed(self) -> tuple[int, ...]:
+    def pressed_cracks(self) -> tuple[int, ...]:
         """Cracks whose faces press on each other in some state."""
         contacts = [[s.contact[c] for s in self.solutions] for c in range(len(self.sifs[0]))]
         return tuple(
@@ -117,33 +117,33 @@ class Indicators:
 
 def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
     """Solutions of a scene at order 2, K and its errors; of fronts no shares."""
-    flat = problem.mesh.dim < 3
-    solutions = solve_states(problem, states, error=flat)
+    is_plane = problem.mesh.dim < 3
+    solutions = solve_states(problem, states, error=is_plane)
     if any(each is not None and each.shear is not None for each in solutions[0].contact):
         raise ProblemError(
             "adapt: crack faces press and rub, and K with friction has no error bars: adapt the "
             "mesh with friction=0, and compare two meshes with friction."
         )
-    live = [k for k, s in enumerate(solutions) if not s.at_rest]
+    numbers_under_load = [k for k, s in enumerate(solutions) if not s.at_rest]
     by_crack: list[list[SIF]] = []
     shares = [np.zeros((0, len(problem.mesh.cells)))]
     for c in range(len(problem.cracks)):
-        sifs = stress_intensities(solutions, c, error=not flat)
+        sifs = stress_intensities(solutions, c, error=not is_plane)
         zero = np.zeros_like(sifs[0].K)
         rows = [replace(sif, errors=KErrors(zero, zero, ("",) * len(zero))) for sif in sifs]
-        if live and not flat:
+        if numbers_under_load and not is_plane:
             rows = sifs
-        if live and flat:
+        if numbers_under_load and is_plane:
             bars, shares_of_crack = bars_and_shares(
-                [solutions[k] for k in live], [sifs[k] for k in live], c
+                [solutions[k] for k in numbers_under_load], [sifs[k] for k in numbers_under_load], c
             )
-            for k, errors in zip(live, bars, strict=True):
+            for k, errors in zip(numbers_under_load, bars, strict=True):
                 rows[k] = replace(sifs[k], errors=errors)
             shares.append(shares_of_crack.reshape(-1, shares_of_crack.shape[-1]))
         by_crack.append(rows)
     surface_reach = _BESIDE[problem.mesh.dim](problem)
     sifs_of = tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions)))
-    best, bar = values(sifs_of, live, surface_reach)
+    best, bar = values(sifs_of, numbers_under_load, surface_reach)
     return Indicators(
         problem,
         tuple(replace(s, factored=None) for s in solutions),
@@ -156,7 +156,7 @@ def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
 
 
 def values(
-    sifs: Sequence[Sequence[SIF]], live: Sequence[int], surface_reach: Sequence[float]
+    sifs: Sequence[Sequence[SIF]], numbers_under_load: Sequence[int], surface_reach: Sequence[float]
 ) -> tuple[Floats, Floats]:
     """Best K and its half-widths at all places that count, crack by crack in all live states.
 
@@ -164,7 +164,7 @@ def values(
     """
     best, bar = [], []
     for c in range(len(surface_reach)):
-        for sif in (sifs[k][c] for k in live):
+        for sif in (sifs[k][c] for k in numbers_under_load):
             is_counted = counted_places(sif, surface_reach[c])
             nothing = np.zeros((int(len(sif.K) > 0 and not is_counted.any()), sif.K.shape[1]))
             best += [sif.best[is_counted], nothing]
@@ -201,9 +201,9 @@ _BESIDE: dict[int, Callable[[Problem], tuple[float, ...]]] = {
 }
 
 
-def live_states(given: Indicators) -> list[int]:
+def live_states(indicators: Indicators) -> list[int]:
     """Numbers of the states that are not at rest."""
-    return [k for k, s in enumerate(given.solutions) if not s.at_rest]
+    return [k for k, s in enumerate(indicators.solutions) if not s.at_rest]
 
 
 __all__ = [

@@ -25,10 +25,10 @@ _MOST_ON_LINES = 400  # places along a crack
 def _hidden_tips(problem: Problem) -> bool:
     """Whether an end counts as a mouth because of the cells beside it only."""
     for crack in problem.cracks:
-        small = length_inside(crack, problem.mesh) / _CELLS
+        least_size = length_inside(crack, problem.mesh) / _CELLS
         for x in _ends(crack, problem.mesh):
             gap, size = nearest_boundary(problem.mesh, x)
-            if size > small and gap <= _MOUTH * size:
+            if size > least_size and gap <= _MOUTH * size:
                 return True
     return False
 
@@ -43,14 +43,14 @@ def _sizes_at_lines(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
         for k, x in enumerate(every[c]):
             others = np.concatenate([np.delete(every[c], k, 0), *every[:c], *every[c + 1 :]])
             distance = np.linalg.norm(others - x, axis=1)
-            least = float(distance[distance > 0].min(initial=np.inf))
+            least_distance = float(distance[distance > 0].min(initial=np.inf))
             place.append(x[None])
-            size.append(np.array([min(length / _CELLS, least / _ROOM) / 2**trial]))
+            size.append(np.array([min(length / _CELLS, least_distance / _ROOM) / 2**trial]))
         if trial:
-            along = _points_along(crack, length / _CELLS / 2**trial)
-            along = along[contains(mesh, along)]
-            place.append(along)
-            size.append(np.full(len(along), length / _CELLS / 2**trial))
+            points_along = _points_along(crack, length / _CELLS / 2**trial)
+            points_along = points_along[contains(mesh, points_along)]
+            place.append(points_along)
+            size.append(np.full(len(points_along), length / _CELLS / 2**trial))
     return growing_sizes(np.concatenate(place), np.concatenate(size), _SLOPE)
 
 
@@ -58,9 +58,11 @@ def _ends(crack: Crack, mesh: Mesh) -> Floats:
     """Ends within the body, farther from its boundary than anybody means a mouth to be."""
     number = np.array([0, -1] if crack.tips is None else crack.tips, dtype=np.int64)
     x = crack.points[number]
-    meant = _MEANT * length_inside(crack, mesh) / _CELLS
-    inside = [contains(mesh, end[None])[0] and nearest_boundary(mesh, end)[0] > meant for end in x]
-    return np.asarray(x[np.array(inside, dtype=bool)])
+    cell_size = _MEANT * length_inside(crack, mesh) / _CELLS
+    is_inside = [
+        contains(mesh, end[None])[0] and nearest_boundary(mesh, end)[0] > cell_size for end in x
+    ]
+    return np.asarray(x[np.array(is_inside, dtype=bool)])
 
 
 def _points_along(crack: Crack, spacing: float) -> Floats:
@@ -88,8 +90,8 @@ def _hidden_fronts(problem: Problem) -> bool:
     for crack in problem.cracks:
         x, size = _outline(crack, body)
         depth, facet = body.depth(x)
-        coarse = (-depth > _MOUTH * size) & (-depth <= _MOUTH * facet)
-        if coarse.mean() > 0.1:  # some are beside the places at which it leaves the body
+        is_coarse = (-depth > _MOUTH * size) & (-depth <= _MOUTH * facet)
+        if is_coarse.mean() > 0.1:  # some are beside the places at which it leaves the body
             return True
     return False
 
@@ -120,8 +122,8 @@ def _outline(crack: Crack, body: Body) -> tuple[Floats, float]:
     parts = np.maximum(np.ceil(side / spacing), 1).astype(np.int64)
     row, part = ranges(parts)
     x = a[row] + ((part + 0.5) / parts[row])[:, None] * (b - a)[row]
-    inside = body.contains(x)
-    x, length = x[inside], float((side / parts)[row][inside].sum())
+    is_inside = body.contains(x)
+    x, length = x[is_inside], float((side / parts)[row][is_inside].sum())
     return x, area / length / CELLS if length > 0 else np.inf
 
 

@@ -56,11 +56,13 @@ def size_ratios(shares: Floats, bar: Floats, target: float, order: int, dim: int
         low, high = 0.0, float(each.max())
         for _ in range(_STEPS):
             threshold = (low + high) / 2
-            left = np.minimum(each, threshold) ** (2 * order / power)
-            left *= each ** (dim / power)
-            low, high = (threshold, high) if left.sum() < aim else (low, threshold)
-        above = each > low
-        ratio[above] = np.minimum(ratio[above], (max(low, 1e-300) / each[above]) ** (1 / power))
+            error_left = np.minimum(each, threshold) ** (2 * order / power)
+            error_left *= each ** (dim / power)
+            low, high = (threshold, high) if error_left.sum() < aim else (low, threshold)
+        is_above = each > low
+        ratio[is_above] = np.minimum(
+            ratio[is_above], (max(low, 1e-300) / each[is_above]) ** (1 / power)
+        )
     return np.maximum(ratio, 2.0 ** (-_MOST / dim))
 
 
@@ -122,73 +124,78 @@ _GENTLER = 2  # times that the aim is doubled where the next mesh would be too l
 _LEAST = 1.05  # cells of the next mesh over those of this one
 
 
-def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
+def trusted_errors(indicators: Indicators, last_indicators: Indicators | None) -> Indicators:
     """Bars that also cover what the last refinement has changed.
 
     Two best values may differ by both bars. Where they differ by more, the estimates have missed
     something, and the bar grows by as much. Where faces press on each other at a kink it is at
     least the change itself.
     """
-    if old is None:
-        return new
-    change = np.abs(new.K - old.K)
-    bent = np.repeat(np.isin(_cracks(new), _bent_cracks(new)), _ends(new))[:, None]
+    if last_indicators is None:
+        return indicators
+    change = np.abs(indicators.K - last_indicators.K)
+    is_bent = np.repeat(np.isin(_cracks(indicators), _bent_cracks(indicators)), _ends(indicators))[
+        :, None
+    ]
     with np.errstate(divide="ignore", invalid="ignore"):
-        growth = change / np.where(bent, new.bar, new.bar + old.bar)
+        growth = change / np.where(is_bent, indicators.bar, indicators.bar + last_indicators.bar)
     growth = np.where(growth > 1, growth, 1.0)
     if (growth == 1).all():
-        return new
-    rows = iter(np.split(growth, np.cumsum(_ends(new))[:-1]))
-    by_crack = [{k: next(rows) for k in live_states(new)} for _ in range(len(new.problem.cracks))]
+        return indicators
+    rows = iter(np.split(growth, np.cumsum(_ends(indicators))[:-1]))
+    by_crack = [
+        {k: next(rows) for k in live_states(indicators)}
+        for _ in range(len(indicators.problem.cracks))
+    ]
     sifs = tuple(
         tuple(
             replace(sif, errors=KErrors(sif.eta, sif.bar * by_crack[c].get(k, 1.0), sif.reasons))
             for c, sif in enumerate(state)
         )
-        for k, state in enumerate(new.sifs)
+        for k, state in enumerate(indicators.sifs)
     )
-    return replace(new, sifs=sifs, bar=new.bar * growth)
+    return replace(indicators, sifs=sifs, bar=indicators.bar * growth)
 
 
-def _cracks(given: Indicators) -> list[int]:
+def _cracks(indicators: Indicators) -> list[int]:
     """Crack of each of these."""
-    return [c for c in range(len(given.problem.cracks)) for _ in live_states(given)]
+    return [c for c in range(len(indicators.problem.cracks)) for _ in live_states(indicators)]
 
 
-def _ends(given: Indicators) -> list[int]:
+def _ends(indicators: Indicators) -> list[int]:
     """Number of tips of each crack and state, in the order of `best`."""
     return [
-        len(given.sifs[k][c].K)
-        for c in range(len(given.problem.cracks))
-        for k in live_states(given)
+        len(indicators.sifs[k][c].K)
+        for c in range(len(indicators.problem.cracks))
+        for k in live_states(indicators)
     ]
 
 
-def next_mesh(current: Indicators, tolerance: float, aim: float, most: int) -> Mesh | None:
+def next_mesh(indicators: Indicators, tolerance: float, aim: float, most_cells: int) -> Mesh | None:
     """A finer mesh, or None where it would have too many unknowns."""
-    mesh, scale = current.problem.mesh, current.scale
-    each = current.solutions[0].space.n_dof / len(mesh.cells)
+    mesh, scale = indicators.problem.mesh, indicators.scale
+    each = indicators.solutions[0].space.n_dof / len(mesh.cells)
     for share in aim * 2.0 ** np.arange(1 + _GENTLER):
         target = tolerance * scale * share
-        ratio = cell_ratios(current, target, 1.0)
-        fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
-        while len(fine.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
-            largest = np.argsort(current.shares.max(axis=0, initial=0.0))[
+        ratio = cell_ratios(indicators, target, 1.0)
+        fine_mesh = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
+        while len(fine_mesh.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
+            largest = np.argsort(indicators.shares.max(axis=0, initial=0.0))[
                 -(len(mesh.cells) // 10) - 1 :
             ]
             ratio[largest] /= 2
-            fine = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
-        if each * len(fine.cells) <= most:
-            return fine
+            fine_mesh = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
+        if each * len(fine_mesh.cells) <= most_cells:
+            return fine_mesh
     return None
 
 
-def at_coarse_tips(current: Indicators) -> Floats:
+def at_coarse_tips(indicators: Indicators) -> Floats:
     """Half of the size around tips that have no bar."""
-    mesh = current.problem.mesh
+    mesh = indicators.problem.mesh
     ratio = np.ones(len(mesh.cells))
     centre = mesh.points[mesh.cells].mean(axis=1)
-    for sif in (sif for state in current.sifs for sif in state):
+    for sif in (sif for state in indicators.sifs for sif in state):
         for x, reason in zip(sif.x, sif.reasons, strict=True):
             distance = np.linalg.norm(centre - x, axis=1)
             is_near = distance <= 2 * mesh.cell_size[np.argmin(distance)]
@@ -196,24 +203,28 @@ def at_coarse_tips(current: Indicators) -> Floats:
     return ratio
 
 
-def _bent_cracks(given: Indicators) -> tuple[int, ...]:
+def _bent_cracks(indicators: Indicators) -> tuple[int, ...]:
     """Cracks that press and have kinks, of whose pressures the estimates see a part only."""
-    return tuple(c for c in given.pressed if len(kink_numbers(given.problem.placed[c].points)))
+    return tuple(
+        c
+        for c in indicators.pressed_cracks
+        if len(kink_numbers(indicators.problem.placed[c].points))
+    )
 
 
-def cell_ratios(current: Indicators, target: float, aim: float) -> Floats:
+def cell_ratios(indicators: Indicators, target: float, aim: float) -> Floats:
     """Size of each cell in a finer mesh over its size in this one `(m,)`.
 
     Parameters
     ----------
-    current : Indicators
+    indicators : Indicators
     target : float, stress · √length
         Half-width that K is to have.
     aim : float
         Share of it that bars of the next mesh are foretold to have.
     """
-    ratio = size_ratios(current.shares, current.bar.ravel(), aim * target, _ORDER, 2)
-    return np.minimum(ratio, at_coarse_tips(current))
+    ratio = size_ratios(indicators.shares, indicators.bar.ravel(), aim * target, _ORDER, 2)
+    return np.minimum(ratio, at_coarse_tips(indicators))
 
 
 __all__ = [

@@ -44,10 +44,10 @@ def coarse_mesh(problem: Problem, tolerance: float) -> Mesh:
     return first_mesh(problem, float(np.clip((tolerance / _BAR) ** (1 / _RISE), 1.0, _COARSEST)))
 
 
-def first_mesh(problem: Problem, coarser: float = 1.0) -> Mesh:
+def first_mesh(problem: Problem, coarseness: float = 1.0) -> Mesh:
     """The mesh of a scene in 3D, finer along fronts where it is coarser than the crack is small."""
     problem = resolved_problem(problem)
-    return refine(problem.mesh, size=graded_sizes(*_first_sizes(problem, coarser)))
+    return refine(problem.mesh, size=graded_sizes(*_first_sizes(problem, coarseness)))
 
 
 def first_size(crack: Crack, mesh: Mesh) -> float:
@@ -55,50 +55,50 @@ def first_size(crack: Crack, mesh: Mesh) -> float:
     return float(surface_size(crack, mesh) / CELLS)
 
 
-def next_mesh(current: Indicators, tolerance: float, aim: float, most: int) -> Mesh | None:
+def next_mesh(indicators: Indicators, tolerance: float, aim: float, most_cells: int) -> Mesh | None:
     """A finer mesh along fronts whose bars are too long, or None where it would be too large."""
-    problem = current.problem
+    problem = indicators.problem
     places, first = _first_sizes(problem)
     sizes = []
     for c, (x, size) in enumerate(zip(places, first, strict=True)):
         if len(x):
-            present = float(np.median(cell_sizes(problem.mesh, x) / size))
-            size = size * present / _refinement_factor(current, c, tolerance, aim)
+            size_ratio = float(np.median(cell_sizes(problem.mesh, x) / size))
+            size = size * size_ratio / _refinement_factor(indicators, c, tolerance, aim)
         sizes.append(size)
     mesh = refine(problem.mesh, size=graded_sizes(places, sizes))
-    each = current.solutions[0].space.n_dof / len(problem.mesh.cells)
-    return mesh if each * len(mesh.cells) <= most else None
+    each = indicators.solutions[0].space.n_dof / len(problem.mesh.cells)
+    return mesh if each * len(mesh.cells) <= most_cells else None
 
 
-def _refinement_factor(current: Indicators, c: int, tolerance: float, aim: float) -> float:
+def _refinement_factor(indicators: Indicators, c: int, tolerance: float, aim: float) -> float:
     """How many times smaller the cells along the fronts of a crack are to be."""
-    error = error_of(current, c)
-    if error <= tolerance and c not in current.pressed:
+    error = error_of(indicators, c)
+    if error <= tolerance and c not in indicators.pressed_cracks:
         return 1.0
     if error <= tolerance or not np.isfinite(error):
         return _LEAST
     return float(np.clip((error / (aim * tolerance)) ** (1 / _POWER), _LEAST, _MOST))
 
 
-def error_of(given: Indicators, c: int) -> float:
+def error_of(indicators: Indicators, c: int) -> float:
     """Largest half-width of K along the fronts of a crack, over the largest K of all.
 
     Nan where there is none.
     """
     bars = [np.zeros(1)]
-    for k in live_states(given):
-        sif = given.sifs[k][c]
-        bars_of_crack = sif.bar[counted_places(sif, given.surface_depths[c])]
+    for k in live_states(indicators):
+        sif = indicators.sifs[k][c]
+        bars_of_crack = sif.bar[counted_places(sif, indicators.surface_depths[c])]
         bars.append(
             bars_of_crack.max(axis=1)
             if len(bars_of_crack) or not len(sif.K)
             else np.full(1, np.nan)
         )
-    scale = given.scale
+    scale = indicators.scale
     return float(np.concatenate(bars).max() / scale) if scale > 0 else float("nan")
 
 
-def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
+def trusted_errors(indicators: Indicators, previous_indicators: Indicators | None) -> Indicators:
     """Bars that are no longer than what smaller cells at the front have changed.
 
     At order 2 the error falls by more than half where cells become smaller by 1.5, so that the
@@ -107,21 +107,32 @@ def trusted_errors(new: Indicators, old: Indicators | None) -> Indicators:
     take what the finer cells elsewhere have changed. Before, bars of fronts that end at a free
     surface are longer by a half than two domains tell.
     """
-    live = live_states(new)
-    if old is None:
-        sifs = tuple(tuple(map(_lengthen_errors, state)) for state in new.sifs)
-        return replace(new, sifs=sifs, bar=values(sifs, live, new.surface_depths)[1])
-    finer = [
-        _sizes_at(old, c) >= _SMALLER * _sizes_at(new, c) for c in range(len(new.problem.cracks))
+    numbers_under_load = live_states(indicators)
+    if previous_indicators is None:
+        sifs = tuple(tuple(map(_lengthen_errors, state)) for state in indicators.sifs)
+        return replace(
+            indicators,
+            sifs=sifs,
+            bar=values(sifs, numbers_under_load, indicators.surface_depths)[1],
+        )
+    is_finer = [
+        _sizes_at(previous_indicators, c) >= _SMALLER * _sizes_at(indicators, c)
+        for c in range(len(indicators.problem.cracks))
     ]
     sifs = tuple(
         tuple(
-            _shorten_errors(_lengthen_errors(sif), previous, finer[c]) if k in live else sif
-            for c, (sif, previous) in enumerate(zip(state, states_before, strict=True))
+            _shorten_errors(_lengthen_errors(sif), previous_sif, is_finer[c])
+            if k in numbers_under_load
+            else sif
+            for c, (sif, previous_sif) in enumerate(zip(state, states_before, strict=True))
         )
-        for k, (state, states_before) in enumerate(zip(new.sifs, old.sifs, strict=True))
+        for k, (state, states_before) in enumerate(
+            zip(indicators.sifs, previous_indicators.sifs, strict=True)
+        )
     )
-    return replace(new, sifs=sifs, bar=values(sifs, live, new.surface_depths)[1])
+    return replace(
+        indicators, sifs=sifs, bar=values(sifs, numbers_under_load, indicators.surface_depths)[1]
+    )
 
 
 def _lengthen_errors(sif: SIF) -> SIF:
@@ -133,34 +144,36 @@ def _lengthen_errors(sif: SIF) -> SIF:
     return replace(sif, errors=KErrors(sif.eta, bar, sif.reasons))
 
 
-def _sizes_at(given: Indicators, c: int) -> float:
+def _sizes_at(indicators: Indicators, c: int) -> float:
     """Median of the cells along the fronts of a crack, length; 0 where there is none."""
-    x = _front(given.problem.placed[c])
-    return float(np.median(cell_sizes(given.problem.mesh, x))) if len(x) else 0.0
+    x = _front(indicators.problem.placed[c])
+    return float(np.median(cell_sizes(indicators.problem.mesh, x))) if len(x) else 0.0
 
 
-def _shorten_errors(sif: SIF, previous: SIF, finer: bool) -> SIF:
+def _shorten_errors(sif: SIF, previous_sif: SIF, is_finer: bool) -> SIF:
     """Bars by the change, as far as two meshes have K at the same places."""
     bar = np.array(sif.bar)
-    inside, is_inside_before = ~sif.at_surface, ~previous.at_surface
+    is_inside, is_inside_before = ~sif.at_surface, ~previous_sif.at_surface
     if not is_inside_before.any():
         return sif
-    nearest = np.nonzero(is_inside_before)[0][cKDTree(previous.x[is_inside_before]).query(sif.x)[1]]
-    every = np.abs(sif.best - previous.best[nearest])
+    nearest = np.nonzero(is_inside_before)[0][
+        cKDTree(previous_sif.x[is_inside_before]).query(sif.x)[1]
+    ]
+    every = np.abs(sif.best - previous_sif.best[nearest])
     for front in np.unique(sif.front):
-        is_on_front = (sif.front == front) & inside
+        is_on_front = (sif.front == front) & is_inside
         if not is_on_front.any():
             continue
         change = every[is_on_front]
         change = np.maximum(change, np.sqrt((change**2).mean(axis=0)))
-        if not finer:
-            change = np.maximum(change, previous.bar[nearest][is_on_front])
+        if not is_finer:
+            change = np.maximum(change, previous_sif.bar[nearest][is_on_front])
         bar[is_on_front] = np.fmin(bar[is_on_front], change)
     bar[sif.closed, 0] = sif.bar[sif.closed, 0]
     return replace(sif, errors=KErrors(sif.eta, bar, sif.reasons))
 
 
-def _first_sizes(problem: Problem, coarser: float = 1.0) -> tuple[list[Floats], list[Floats]]:
+def _first_sizes(problem: Problem, coarseness: float = 1.0) -> tuple[list[Floats], list[Floats]]:
     """Places along the fronts of each crack, and the longest edges of the first mesh there."""
     places, sizes = [], []
     for crack in problem.placed:
@@ -171,11 +184,15 @@ def _first_sizes(problem: Problem, coarser: float = 1.0) -> tuple[list[Floats], 
         sizes.append(np.minimum(size, bend))
     # Where cracks are near each other cells stay small all along: sizes that differ much within
     # the reach of the tip functions leave a matrix that is not positive.
-    near = with_room(places, [coarser * size for size in sizes])
-    is_alone = [np.array_equal(a, coarser * b) for a, b in zip(near, sizes, strict=True)]
+    sizes_in_room = with_room(places, [coarseness * size for size in sizes])
+    is_alone = [
+        np.array_equal(a, coarseness * b) for a, b in zip(sizes_in_room, sizes, strict=True)
+    ]
     return places, [
-        a if alone else b
-        for a, b, alone in zip(near, with_room(places, sizes), is_alone, strict=True)
+        a if is_alone_here else b
+        for a, b, is_alone_here in zip(
+            sizes_in_room, with_room(places, sizes), is_alone, strict=True
+        )
     ]
 
 

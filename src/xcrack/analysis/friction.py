@@ -312,7 +312,7 @@ def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
     solve = _TWIN[rows.tangents]
     if rows.compliance is None:
         return solve(rows, d, status)
-    if not rows.augmented:
+    if not rows.is_augmented:
         try:
             return solve(rows, d, status)
         except ConvergenceError as error:
@@ -469,7 +469,7 @@ def solve_friction(
         method = problem.numerics.contact_method
         is_augmented = method is not None and method.updates
         rows = replace(
-            rows, F=rows.F + np.diag(diagonal), compliance=diagonal, augmented=is_augmented
+            rows, F=rows.F + np.diag(diagonal), compliance=diagonal, is_augmented=is_augmented
         )
     status = all_stuck(rows)
     if start is not None:
@@ -562,16 +562,16 @@ def _substep_displacements(
     engine: Engine, N: sp.csr_matrix, f: Floats, u_imposed: Floats, places: Sequence[SlipPoint]
 ) -> Floats:
     """Displacements of all substeps: other faces may overlap in one of them."""
-    loads, imposed = [], []
+    loads, u_of_substeps = [], []
     previous_load = np.zeros(len(f)), np.zeros(len(f))
     for k, place in enumerate(places):
         for share, lam in place.between[:-1]:
             loads.append(previous_load[0] + share * (f[:, k] - previous_load[0]) + N.T @ lam)
-            imposed.append(previous_load[1] + share * (u_imposed[:, k] - previous_load[1]))
+            u_of_substeps.append(previous_load[1] + share * (u_imposed[:, k] - previous_load[1]))
         previous_load = f[:, k], u_imposed[:, k]
     if not loads:
         return np.zeros((len(f), 0))
-    return engine.solve(np.stack(loads, axis=1), np.stack(imposed, axis=1))
+    return engine.solve(np.stack(loads, axis=1), np.stack(u_of_substeps, axis=1))
 
 
 __all__ = [

@@ -412,7 +412,7 @@ _ON_FACE = np.array([(i, j, 8 - i - j) for i in range(9) for j in range(9 - i)])
 
 def _order(problem: Problem) -> list[Ingredient]:
     """What order 1 does to K in 3D; nothing elsewhere."""
-    deep = {}
+    depth_in_cells = {}
     if problem.mesh.dim == 3 and problem.order == 1:
         body = Body.of(problem.mesh)
         for c, crack in enumerate(problem.placed):
@@ -420,12 +420,12 @@ def _order(problem: Problem) -> list[Ingredient]:
             x = x[body.contains(x)]
             if crack.fronts and len(x):
                 front = crack.points[np.concatenate(crack.fronts)]
-                deep[c] = cells_deep(x, front, problem.mesh)
-    if not deep:
+                depth_in_cells[c] = cells_deep(x, front, problem.mesh)
+    if not depth_in_cells:
         return []
-    depths = ", ".join(f"crack {c}: {value:.2g} cells deep" for c, value in deep.items())
-    why = f"{depths}; K is 1 to 5 % too low below five cells, order=2 within 0.5 %"
-    return [Ingredient("order 1", True, why)]
+    depths = ", ".join(f"crack {c}: {value:.2g} cells deep" for c, value in depth_in_cells.items())
+    reason = f"{depths}; K is 1 to 5 % too low below five cells, order=2 within 0.5 %"
+    return [Ingredient("order 1", True, reason)]
 
 
 def _friction(problem: Problem) -> list[Ingredient]:

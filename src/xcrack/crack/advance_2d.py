@@ -40,20 +40,20 @@ def advance(crack: Crack, angle: ArrayLike, da: ArrayLike) -> Crack:
     step = numbers(da, "advance: da", (len(x),), error=GeometryError)
     if (step < 0).any():
         raise GeometryError(f"da = {step.min()} at tip {step.argmin()}: a crack does not shrink.")
-    back = (np.abs(beta) > np.pi - _BACK) & (step > 0)
-    if back.any():
-        k = int(np.argmax(back))
+    is_backward = (np.abs(beta) > np.pi - _BACK) & (step > 0)
+    if is_backward.any():
+        k = int(np.argmax(is_backward))
         raise GeometryError(
             f"the tip at {at(x[k])} turns back on its own crack (by {beta[k]:.6g} rad): angles "
             "of growth lie between -pi and pi."
         )
-    moved = x + step[:, None] * (
+    moved_x = x + step[:, None] * (
         np.cos(beta)[:, None] * frame[:, 0] + np.sin(beta)[:, None] * frame[:, 1]
     )
-    return with_tips(crack, moved, step != 0, np.zeros(len(x), dtype=bool))
+    return with_tips(crack, moved_x, step != 0, np.zeros(len(x), dtype=bool))
 
 
-def with_tips(crack: Crack, x: Floats, moves: Bools, instead: Bools) -> Crack:
+def with_tips(crack: Crack, x: Floats, moves: Bools, is_replaced: Bools) -> Crack:
     """A placed crack with its tips at other points.
 
     Parameters
@@ -62,7 +62,7 @@ def with_tips(crack: Crack, x: Floats, moves: Bools, instead: Bools) -> Crack:
     x : (f, 2) array, length
     moves : (f,) array of bool
         The other tips stay to the last bit.
-    instead : (f,) array of bool
+    is_replaced : (f,) array of bool
         Whether the last point of a tip that moves is replaced; else a face is added to it.
 
     Returns
@@ -77,12 +77,14 @@ def with_tips(crack: Crack, x: Floats, moves: Bools, instead: Bools) -> Crack:
     points = np.array(crack.points)
     for k, tip in enumerate(crack.tips or ()):
         if moves[k]:
-            new = x[k : k + 1]
-            old = points[1:] if tip == 0 and instead[k] else points
-            old = old[:-1] if tip != 0 and instead[k] else old
-            points = np.concatenate([new, old] if tip == 0 else [old, new])
+            new_point = x[k : k + 1]
+            old_points = points[1:] if tip == 0 and is_replaced[k] else points
+            old_points = old_points[:-1] if tip != 0 and is_replaced[k] else old_points
+            points = np.concatenate(
+                [new_point, old_points] if tip == 0 else [old_points, new_point]
+            )
     tips = [0 if tip == 0 else len(points) - 1 for tip in crack.tips or ()]
-    for tip in (tip for tip, moved in zip(tips, moves) if moved):
+    for tip in (tip for tip, has_moved in zip(tips, moves) if has_moved):
         line = points if tip == 0 else points[::-1]
         if len(line) > 2 and _turns_back(line[0] - line[1], line[1] - line[2]):
             raise GeometryError(f"the crack turns back on itself at {at(line[1])}.")
@@ -95,9 +97,12 @@ def with_tips(crack: Crack, x: Floats, moves: Bools, instead: Bools) -> Crack:
     return polyline_crack(points, tuple(tips))
 
 
-def _turns_back(ahead: Floats, before: Floats) -> bool:
+def _turns_back(direction: Floats, previous_direction: Floats) -> bool:
     """Whether a face lies on the one before it."""
-    turn = np.arctan2(ahead[1] * before[0] - ahead[0] * before[1], ahead @ before)
+    turn = np.arctan2(
+        direction[1] * previous_direction[0] - direction[0] * previous_direction[1],
+        direction @ previous_direction,
+    )
     return bool(abs(turn) > np.pi - _BACK)
 
 

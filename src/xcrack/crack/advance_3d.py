@@ -102,62 +102,68 @@ def advance_fronts(
     number = np.asarray(front, dtype=np.int64)
     _check(crack, s, number, angle, da, size)
     fronts = front_frames(crack)
-    alone = [((k,), front.closed) for k, front in enumerate(fronts)]
-    chains = through_holes(crack, fronts, body) if body is not None else alone
-    sent, wholes = [], []
+    single_fronts = [((k,), front.closed) for k, front in enumerate(fronts)]
+    chains = through_holes(crack, fronts, body) if body is not None else single_fronts
+    rays_of_chains, wholes = [], []
     for members, goes_round in chains:
-        old, begins = joined_front([fronts[k] for k in members], goes_round)
+        old_front, begin = joined_front([fronts[k] for k in members], goes_round)
         is_member = np.isin(number, members)
         shift = np.zeros(len(fronts))
-        shift[list(members)] = begins
-        wholes.append(old)
+        shift[list(members)] = begin
+        wholes.append(old_front)
         place = s[is_member] + shift[number[is_member]]
-        sent.append(_advanced_points(old, place, angle[is_member], da[is_member], size))
-    meets = np.zeros((0, 3))
-    if body is not None and chains == alone and not has_way_to_hole(sent, body):
+        rays_of_chains.append(
+            _advanced_points(old_front, place, angle[is_member], da[is_member], size)
+        )
+    meeting_points = np.zeros((0, 3))
+    if body is not None and chains == single_fronts and not has_way_to_hole(rays_of_chains, body):
         body = None  # no hole is near: the way of any front
     if body is not None:
-        sent, meets = rays_in_body(sent, size, body)
+        rays_of_chains, meeting_points = rays_in_body(rays_of_chains, size, body)
     n_points = len(crack.points)
     points, faces = [crack.points], [crack.faces]
     lines: list[Ints] = []
     strips: list[tuple[int, AdvanceStrip]] = []
-    for (members, _), old, rays in zip(chains, wholes, sent):
+    for (members, _), old_front, rays in zip(chains, wholes, rays_of_chains):
         if rays is None or rays[0].is_at_rest.all():
             lines.extend((crack.fronts or ())[k] for k in members)
             continue
         path = float(np.linalg.norm(rays[0].stop - rays[0].start, axis=1).max())
         longest = float(da[number == members[0]].max()) if body is None else path
-        new = _strip(old, rays, longest, size, n_points, body)
+        strip = _strip(old_front, rays, longest, size, n_points, body)
         if body is not None:
-            _check_reach(old, new.points, float(da[np.isin(number, members)].max()), size, body)
-        points.append(new.points)
-        faces.append(new.faces)
-        parts = [new.front] if len(members) == 1 else _parts(new.front, crack)
-        strips.extend((len(lines) + k, new) for k in range(len(parts)))
+            _check_reach(
+                old_front, strip.points, float(da[np.isin(number, members)].max()), size, body
+            )
+        points.append(strip.points)
+        faces.append(strip.faces)
+        parts = [strip.front] if len(members) == 1 else _parts(strip.front, crack)
+        strips.extend((len(lines) + k, strip) for k in range(len(parts)))
         lines.extend(parts)
-        n_points += len(new.points)
-    grown = Crack(np.concatenate(points), np.concatenate(faces), None, tuple(lines), crack.ends_on)
+        n_points += len(strip.points)
+    grown_crack = Crack(
+        np.concatenate(points), np.concatenate(faces), None, tuple(lines), crack.ends_on
+    )
     if body is not None:
-        _check_folds(grown)
-    for k, new in strips:
-        _check_free(crack, grown, k, new, size, body, meets)
-    return grown
+        _check_folds(grown_crack)
+    for k, strip in strips:
+        _check_free(crack, grown_crack, k, strip, size, body, meeting_points)
+    return grown_crack
 
 
-def _check_reach(old: Front, x: Floats, da: float, size: float, body: Body) -> None:
+def _check_reach(old_front: Front, x: Floats, da: float, size: float, body: Body) -> None:
     """Raise where a front in the body has come farther from the old one than it advances."""
     x = x[body.contains(x)]
-    most = _REACH[0] * da + _REACH[1] * size
+    largest_reach = _REACH[0] * da + _REACH[1] * size
     if not len(x):
         return
-    away, _, _ = front_distance(x, old.x, old.closed, 4 * most)
-    k = int(np.argmax(away))
-    if away[k] > most:
+    distance, _, _ = front_distance(x, old_front.x, old_front.closed, 4 * largest_reach)
+    k = int(np.argmax(distance))
+    if distance[k] > largest_reach:
         raise GeometryError(
-            f"the front that has come to {_at(x[k : k + 1])} runs over itself, {away[k]:.4g} from "
-            f"where it was with an advance of {da:.4g}: parts that meet behind a hole pass each "
-            "other. Take a smaller da, or smaller cells there."
+            f"the front that has come to {_at(x[k : k + 1])} runs over itself, {distance[k]:.4g} "
+            f"from where it was with an advance of {da:.4g}: parts that meet behind a hole pass "
+            "each other. Take a smaller da, or smaller cells there."
         )
 
 
@@ -174,10 +180,10 @@ def _check_folds(crack: Crack) -> None:
 def _parts(line: Ints, crack: Crack) -> list[Ints]:
     """A new front cut where it would run on from one old front to another that both stay."""
     outline = {(int(b), int(a)) for a, b in rim(crack.faces)[0]}
-    old, n = line < len(crack.points), len(line) - 1
+    is_old, n = line < len(crack.points), len(line) - 1
     cuts = [
         k for k in range(n)
-        if old[k] and old[k + 1] and (int(line[k]), int(line[k + 1])) not in outline
+        if is_old[k] and is_old[k + 1] and (int(line[k]), int(line[k + 1])) not in outline
     ]  # fmt: skip
     if cuts and line[0] == line[-1]:
         line = np.append(np.roll(line[:-1], -1 - cuts[0]), line[cuts[0] + 1])[:-1]
@@ -224,29 +230,34 @@ def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size
 
 
 def _strip(
-    old: Front, sent: Rays, longest: float, size: float, n_points: int, body: Body | None
+    old_front: Front,
+    rays_of_front: Rays,
+    longest: float,
+    size: float,
+    n_points: int,
+    body: Body | None,
 ) -> AdvanceStrip:
     """New points and faces ahead of one front."""
-    rays, vertex, normal = sent
+    rays, vertex, normal = rays_of_front
     front = without_loops(rays)
-    if len(front.x) < 3 and old.closed:
-        raise _closes(old)
+    if len(front.x) < 3 and old_front.closed:
+        raise _closing_error(old_front)
     # A wave along the front is damped, beyond da of a few sides turned over, by the growth itself:
     # K is larger where the front lags behind. What longer steps overshoot more passes take away.
-    smooth = faired_front(front, int(np.clip(np.ceil(_PASSES * longest / size), 1, 8)))
-    before = np.linalg.norm(front.side, axis=1).sum()
-    after = np.linalg.norm(smooth.side, axis=1).sum()
-    if abs(after - before) > _LOST * before:
+    faired = faired_front(front, int(np.clip(np.ceil(_PASSES * longest / size), 1, 8)))
+    length_before = np.linalg.norm(front.side, axis=1).sum()
+    length_after = np.linalg.norm(faired.side, axis=1).sum()
+    if abs(length_after - length_before) > _LOST * length_before:
         warn(
-            f"fairing changes the length of the front at {_at(smooth.x)} from {before:.4g} to "
-            f"{after:.4g}: its points zigzag. K along the front, or the advance, jumps from point "
-            "to point; smooth it, or take a smaller da."
+            f"fairing changes the length of the front at {_at(faired.x)} from {length_before:.4g} "
+            f"to {length_after:.4g}: its points zigzag. K along the front, or the advance, jumps "
+            "from point to point; smooth it, or take a smaller da."
         )
-    return _joined_strip(old, rays, smooth, vertex, normal, size, n_points, body)
+    return _joined_strip(old_front, rays, faired, vertex, normal, size, n_points, body)
 
 
 def _joined_strip(
-    old: Front,
+    old_front: Front,
     rays: FrontChain,
     front: FrontChain,
     vertex: Ints,
@@ -261,28 +272,28 @@ def _joined_strip(
     they are taken back; where points that have run into each other do so, these are merged.
     Outside the body nothing depends on it.
     """
-    pinned = rays.is_pinned[rays.owner]
-    needed = np.zeros(len(rays.owner), dtype=bool)
+    is_pinned = rays.is_pinned[rays.owner]
+    is_needed = np.zeros(len(rays.owner), dtype=bool)
     while True:
-        trial = _cleared_front(_pinned_front(front, pinned | needed), size)
-        strip, turned_sides = _stitched_strip(old, trial, vertex, normal, size, n_points)
+        trial = _cleared_front(_pinned_front(front, is_pinned | is_needed), size)
+        strip, turned_sides = _stitched_strip(old_front, trial, vertex, normal, size, n_points)
         if not len(turned_sides):
             return strip
         ends = np.concatenate([turned_sides, (turned_sides + 1) % len(trial.x)])
-        around = np.isin(trial.owner, ends)
-        if (around & ~needed).any():
-            needed |= around
+        is_around = np.isin(trial.owner, ends)
+        if (is_around & ~is_needed).any():
+            is_needed |= is_around
             continue
         if body is not None:
-            inside = body.contains(trial.x)
+            is_inside = body.contains(trial.x)
             turned_sides = turned_sides[
-                inside[turned_sides] | inside[(turned_sides + 1) % len(inside)]
+                is_inside[turned_sides] | is_inside[(turned_sides + 1) % len(is_inside)]
             ]
             if not len(turned_sides):
                 return strip
-        front = without_sides(_pinned_front(trial, pinned), turned_sides)
-        if old.closed and len(front.x) < 3:
-            raise _closes(old)
+        front = without_sides(_pinned_front(trial, is_pinned), turned_sides)
+        if old_front.closed and len(front.x) < 3:
+            raise _closing_error(old_front)
         if len(front.x) == len(trial.x):
             raise GeometryError(
                 f"the front that has come to {_at(trial.x[turned_sides[:1]])} folds: neighbours "
@@ -293,9 +304,9 @@ def _joined_strip(
 
 def _pinned_front(front: FrontChain, rays: Bools) -> FrontChain:
     """A front of which those points are pinned that one of the given rays has become."""
-    pinned = np.zeros(len(front.x), dtype=bool)
-    pinned[front.owner[rays]] = True
-    return replace(front, is_pinned=pinned)
+    is_pinned = np.zeros(len(front.x), dtype=bool)
+    is_pinned[front.owner[rays]] = True
+    return replace(front, is_pinned=is_pinned)
 
 
 def _cleared_front(front: FrontChain, size: float) -> FrontChain:
@@ -307,10 +318,10 @@ def _cleared_front(front: FrontChain, size: float) -> FrontChain:
             return front
 
 
-def _closes(old: Front) -> GeometryError:
+def _closing_error(old_front: Front) -> GeometryError:
     return GeometryError(
-        f"the front around {_at(old.x)} closes upon itself: what it went around is cut through. "
-        "End growth before, or take a smaller da to come closer."
+        f"the front around {_at(old_front.x)} closes upon itself: what it went around is cut "
+        "through. End growth before, or take a smaller da to come closer."
     )
 
 
@@ -318,7 +329,9 @@ def _at(x: Floats) -> list[float]:
     return list(np.round(x.mean(axis=0), 6).tolist())
 
 
-def _advanced_points(old: Front, s: Floats, angle: Floats, da: Floats, size: float) -> Rays | None:
+def _advanced_points(
+    old_front: Front, s: Floats, angle: Floats, da: Floats, size: float
+) -> Rays | None:
     """Where the points of a front go, which of them are its vertices, and the new normals.
 
     Sides of the front much longer than `size` send out points from between their ends. None where
@@ -326,48 +339,48 @@ def _advanced_points(old: Front, s: Floats, angle: Floats, da: Floats, size: flo
     """
     if not len(s) or da.max() == 0:
         return None
-    m, closed = len(old.x), old.closed
-    following = np.roll(np.arange(m), -1) if closed else np.arange(1, m)
-    leading = np.arange(len(following))
-    side = np.linalg.norm(old.x[following] - old.x[leading], axis=1)
-    breaks = front_curve(old.x, old.frame, closed).breaks
-    length = float(breaks[-1])
+    m, is_closed = len(old_front.x), old_front.closed
+    next_point = np.roll(np.arange(m), -1) if is_closed else np.arange(1, m)
+    first_point = np.arange(len(next_point))
+    side = np.linalg.norm(old_front.x[next_point] - old_front.x[first_point], axis=1)
+    arc_of_points = front_curve(old_front.x, old_front.frame, is_closed).breaks
+    length = float(arc_of_points[-1])
     pieces = np.where(side > HIGH * size, np.round(side / size), 1).astype(np.int64)
-    inner = division_points(old.x, closed, pieces, np.zeros(m, dtype=bool))
-    own_frame = _frames(old)
+    inner = division_points(old_front.x, is_closed, pieces, np.zeros(m, dtype=bool))
+    own_frame = _frames(old_front)
     x: list[Floats] = []
     place: list[float] = []
     frame: list[Floats] = []
     vertex: list[int] = []
     for j in range(m):
         vertex.append(len(place))
-        x.append(old.x[j : j + 1])
-        place.append(float(breaks[j]))
+        x.append(old_front.x[j : j + 1])
+        place.append(float(arc_of_points[j]))
         frame.append(own_frame[j : j + 1, :2])
-        if j == len(leading):
+        if j == len(first_point):
             break
         t = np.arange(1, pieces[j]) / pieces[j]
         x.append(inner[j])
-        place.extend(breaks[j] + t * (breaks[j + 1] - breaks[j]))
+        place.extend(arc_of_points[j] + t * (arc_of_points[j + 1] - arc_of_points[j]))
         blend = t[:, None, None]
-        frame.append((1 - blend) * own_frame[j, :2] + blend * own_frame[following[j], :2])
+        frame.append((1 - blend) * own_frame[j, :2] + blend * own_frame[next_point[j], :2])
     start, where = np.concatenate(x), np.array(place)
-    ahead, normal = np.concatenate(frame).transpose(1, 0, 2)
-    step = along_front(s, da, where, closed, length)
-    turn = along_front(s, angle, where, closed, length)
+    frame_ahead, normal = np.concatenate(frame).transpose(1, 0, 2)
+    step = along_front(s, da, where, is_closed, length)
+    turn = along_front(s, angle, where, is_closed, length)
     step[step < min(_LEAST * size, 0.1 * float(step.max()))] = 0.0
-    direction = np.cos(turn)[:, None] * ahead + np.sin(turn)[:, None] * normal
+    direction = np.cos(turn)[:, None] * frame_ahead + np.sin(turn)[:, None] * normal
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     stop = start + step[:, None] * direction
-    new_normal = np.cos(turn)[:, None] * normal - np.sin(turn)[:, None] * ahead
-    still = step == 0
-    if still.all():
+    new_normal = np.cos(turn)[:, None] * normal - np.sin(turn)[:, None] * frame_ahead
+    is_at_rest = step == 0
+    if is_at_rest.all():
         return None
     is_vertex = np.zeros(len(start), dtype=bool)
     is_vertex[vertex] = True
-    chosen = is_vertex | ~still
+    chosen = is_vertex | ~is_at_rest
     number = np.cumsum(chosen) - 1
-    rays = chain(start[chosen], stop[chosen], still[chosen], closed)
+    rays = chain(start[chosen], stop[chosen], is_at_rest[chosen], is_closed)
     return rays, number[np.array(vertex)], new_normal[chosen]
 
 
@@ -376,50 +389,52 @@ def _frames(front: Front) -> Floats:
     frame = np.array(front.frame)
     side = steps(front.x, front.closed)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
-    back = np.roll(side, 1, axis=0)
+    previous_side = np.roll(side, 1, axis=0)
     if not front.closed:
-        back, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
-    sharp = np.einsum("ij,ij->i", back, side) < _SHARP
-    along = (back + side)[sharp]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
-    normal = frame[sharp, 1]
-    normal -= np.einsum("ij,ij->i", normal, along)[:, None] * along
+        previous_side, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
+    is_sharp = np.einsum("ij,ij->i", previous_side, side) < _SHARP
+    bisector = (previous_side + side)[is_sharp]
+    bisector /= np.maximum(np.linalg.norm(bisector, axis=1, keepdims=True), 1e-300)
+    normal = frame[is_sharp, 1]
+    normal -= np.einsum("ij,ij->i", normal, bisector)[:, None] * bisector
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    frame[sharp] = np.stack([np.cross(normal, along), normal, along], axis=1)
+    frame[is_sharp] = np.stack([np.cross(normal, bisector), normal, bisector], axis=1)
     return frame
 
 
 def _stitched_strip(
-    old: Front, front: FrontChain, vertex: Ints, normal: Floats, size: float, n_points: int
+    old_front: Front, front: FrontChain, vertex: Ints, normal: Floats, size: float, n_points: int
 ) -> tuple[AdvanceStrip, Ints]:
     """The strip up to a new front, and the sides of it at which triangles are turned over."""
-    fixed = front.fixed()
+    is_fixed = front.fixed_sides()
     length = np.linalg.norm(front.side, axis=1)
-    pieces = np.where(~fixed & (length > HIGH * size), np.round(length / size), 1).astype(np.int64)
+    pieces = np.where(~is_fixed & (length > HIGH * size), np.round(length / size), 1).astype(
+        np.int64
+    )
     n, n_rays = len(front.x), len(front.owner)
     own_number = np.full(n, -1)
     ray_to_vertex = np.full(n_rays, -1)
     ray_to_vertex[vertex] = np.arange(len(vertex))
-    still = np.nonzero(front.is_at_rest)[0]
-    own_number[front.owner[still]] = old.number[ray_to_vertex[still]]
+    rows_at_rest = np.nonzero(front.is_at_rest)[0]
+    own_number[front.owner[rows_at_rest]] = old_front.number[ray_to_vertex[rows_at_rest]]
     inner = division_points(front.x, front.is_closed, pieces, own_number >= 0)
     points: list[Floats] = []
     line: list[int] = []
     begin = np.zeros(n, dtype=np.int64)
     count = n_points
-    x_of: dict[int, Floats] = {int(number): x for number, x in zip(old.number, old.x)}
+    x_of: dict[int, Floats] = {int(number): x for number, x in zip(old_front.number, old_front.x)}
     for g in range(n):
         begin[g] = len(line)
-        new = [] if own_number[g] >= 0 else [front.x[g]]
+        new_places = [] if own_number[g] >= 0 else [front.x[g]]
         if g < len(inner):
-            new.extend(inner[g])
+            new_places.extend(inner[g])
         if own_number[g] >= 0:
             line.append(int(own_number[g]))
-        for x in new:
+        for x in new_places:
             x_of[count] = x
             line.append(count)
             count += 1
-        points.extend(new)
+        points.extend(new_places)
     if front.is_closed:
         line.append(line[0])
     end = np.append(begin[1:], len(line) - 1)
@@ -430,19 +445,19 @@ def _stitched_strip(
         first, last = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
         last += n_rays if last <= first else 0
         owners = front.owner[np.arange(first, last + 1) % n_rays]
-        ahead, across = [line[begin[owners[0]]]], []
+        chain_ahead, crossing_owners = [line[begin[owners[0]]]], []
         for one, other in zip(owners, owners[1:]):
             if one != other:
-                across.append(int(one))
-                ahead.extend(line[begin[one] + 1 : end[one] + 1])
-        corners = int(old.number[j]), int(old.number[(j + 1) % len(vertex)])
-        x = np.array([x_of[p] for p in (*corners, *ahead)])
-        expected = normal[first] + normal[last % n_rays]
-        expected /= np.linalg.norm(expected)
-        triangles, upright = stitch_side(corners, ahead, x, expected)
+                crossing_owners.append(int(one))
+                chain_ahead.extend(line[begin[one] + 1 : end[one] + 1])
+        corners = int(old_front.number[j]), int(old_front.number[(j + 1) % len(vertex)])
+        x = np.array([x_of[p] for p in (*corners, *chain_ahead)])
+        expected_normal = normal[first] + normal[last % n_rays]
+        expected_normal /= np.linalg.norm(expected_normal)
+        triangles, cosine = stitch_side(corners, chain_ahead, x, expected_normal)
         faces.extend(triangles)
-        if upright < _UPRIGHT:
-            turned_sides.extend(across or [(int(owners[0]) - 1) % n, int(owners[0])])
+        if cosine < _UPRIGHT:
+            turned_sides.extend(crossing_owners or [(int(owners[0]) - 1) % n, int(owners[0])])
     turned_sides = [side for side in turned_sides if side < len(front.side)]
     strip = AdvanceStrip(
         np.array(points).reshape(-1, 3),
@@ -455,30 +470,32 @@ def _stitched_strip(
 
 
 def _check_free(
-    old: Crack, grown: Crack, number: int, strip: AdvanceStrip, size: float,
-    body: Body | None, meets: Floats,
+    old_crack: Crack, grown_crack: Crack, number: int, strip: AdvanceStrip, size: float,
+    body: Body | None, meeting_points: Floats,
 ) -> None:  # fmt: skip
     """Raise where a front that has advanced meets another part of its crack.
 
     Outside the body it may, and beside the places where two fronts meet.
     """
-    new = front_frames(grown)[number]
-    moved = new.number >= len(old.points)
-    if not new.closed:
-        moved[[0, -1]] = False  # outside the body, beside the outline of the mouth
-    probe = new.x[moved] + _AHEAD * size * _frames(new)[moved, 0]
-    probe = probe[must_be_free(new.x[moved], size, body, meets)]
-    phi, _, _ = surface_distance(probe, grown.points, grown.faces, _AHEAD * size)
+    new_front = front_frames(grown_crack)[number]
+    is_moved = new_front.number >= len(old_crack.points)
+    if not new_front.closed:
+        is_moved[[0, -1]] = False  # outside the body, beside the outline of the mouth
+    probe = new_front.x[is_moved] + _AHEAD * size * _frames(new_front)[is_moved, 0]
+    probe = probe[must_be_free(new_front.x[is_moved], size, body, meeting_points)]
+    phi, _, _ = surface_distance(probe, grown_crack.points, grown_crack.faces, _AHEAD * size)
     hit = probe[np.abs(phi) < 0.5 * _AHEAD * size]
     if not len(hit):
         path = strip.stop - strip.start
         length = np.linalg.norm(path, axis=1)
         # The faces around the start of a path are its own.
-        is_far = (length > 0.5 * size) & must_be_free(strip.stop, size, body, meets)
+        is_far = (length > 0.5 * size) & must_be_free(strip.stop, size, body, meeting_points)
         start = strip.start[is_far] + path[is_far] * (0.5 * size / length[is_far])[:, None]
         stop = strip.stop[is_far]
-        crossed, place = first_crossing(triangle_tree(old.points, old.faces), start, stop)
-        hit = (start + place[:, None] * (stop - start))[crossed >= 0]
+        triangle_hit, place = first_crossing(
+            triangle_tree(old_crack.points, old_crack.faces), start, stop
+        )
+        hit = (start + place[:, None] * (stop - start))[triangle_hit >= 0]
     if len(hit):
         raise GeometryError(
             f"front {number} of a crack meets another part of the same crack near "

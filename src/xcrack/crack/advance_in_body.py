@@ -40,34 +40,34 @@ def joined_front(fronts: Sequence[Front], goes_round: bool) -> tuple[Front, list
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
     number = np.concatenate([front.number for front in fronts])
     first = np.cumsum([0, *(len(front.x) for front in fronts[:-1])])
-    whole = Front(x, frame, goes_round, s, number)
-    return whole, front_curve(x, frame, goes_round).breaks[first].tolist()
+    front_of_all = Front(x, frame, goes_round, s, number)
+    return front_of_all, front_curve(x, frame, goes_round).breaks[first].tolist()
 
 
-def has_way_to_hole(sent: Sequence[Rays | None], body: Body) -> bool:
+def has_way_to_hole(rays_of_fronts: Sequence[Rays | None], body: Body) -> bool:
     """Whether something that fronts send out comes from the body into a hole of it."""
     share = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]
-    for rays in sent:
+    for rays in rays_of_fronts:
         if rays is None:
             continue
         front, normal = rays[0], rays[2]
         move = front.stop - front.start
         x = front.start[:, None] + share[:, None] * move[:, None]
-        outside = ~body.contains(x.reshape(-1, 3)).reshape(len(move), -1)
-        rows = np.nonzero(outside.any(axis=1) & body.contains(front.start))[0]
-        if is_enclosed(x[rows, np.argmax(outside[rows], axis=1)], normal[rows], body).any():
+        is_outside = ~body.contains(x.reshape(-1, 3)).reshape(len(move), -1)
+        rows = np.nonzero(is_outside.any(axis=1) & body.contains(front.start))[0]
+        if is_enclosed(x[rows, np.argmax(is_outside[rows], axis=1)], normal[rows], body).any():
             return True
     return False
 
 
 def rays_in_body(
-    sent: Sequence[Rays | None], size: float, body: Body
+    rays_of_fronts: Sequence[Rays | None], size: float, body: Body
 ) -> tuple[list[Rays | None], Floats]:
     """What the fronts of a crack send out, as far as it goes in a body.
 
     Parameters
     ----------
-    sent : sequence of Rays or None
+    rays_of_fronts : sequence of Rays or None
         One a front.
     size : float, length
         Of the sides of fronts.
@@ -75,56 +75,64 @@ def rays_in_body(
 
     Returns
     -------
-    sent : list of Rays or None
-    meets : (k, 3) array, length
+    rays_of_fronts : list of Rays or None
+    meeting_points : (k, 3) array, length
         Where two fronts of the crack, or its ends at a hole, are about to meet.
     """
-    fronts = [None if rays is None else _stopped_in_holes(rays[0], size, body) for rays in sent]
-    fronts, meets = _stopped_at_fronts(fronts, size, body)
-    fronts, beside = _with_ends_outside(fronts, size, body)
+    fronts = [
+        None if rays is None else _stopped_in_holes(rays[0], size, body) for rays in rays_of_fronts
+    ]
+    fronts, meeting_points = _stopped_at_fronts(fronts, size, body)
+    fronts, end_points = _with_ends_outside(fronts, size, body)
     result = [
         None if rays is None or front is None else (_still_at_vertices(front, rays[1]), *rays[1:])
-        for rays, front in zip(sent, fronts)
+        for rays, front in zip(rays_of_fronts, fronts)
     ]
-    return result, np.concatenate([meets, beside])
+    return result, np.concatenate([meeting_points, end_points])
 
 
 def _still_at_vertices(front: FrontChain, vertex: Ints) -> FrontChain:
     """A front on which points within its old sides that do not move fall on vertices beside."""
-    between = front.is_at_rest & ~np.isin(np.arange(len(front.is_at_rest)), vertex)
-    if not between.any():
+    is_between = front.is_at_rest & ~np.isin(np.arange(len(front.is_at_rest)), vertex)
+    if not is_between.any():
         return front
-    rows, n = np.nonzero(between)[0], len(between)
-    beside = np.zeros(n, dtype=np.int64)
-    for run in runs_of(between) if front.is_closed else open_runs(between):
+    rows, n = np.nonzero(is_between)[0], len(is_between)
+    neighbour = np.zeros(n, dtype=np.int64)
+    for run in runs_of(is_between) if front.is_closed else open_runs(is_between):
         # What moves beside them stays between its neighbours, or the front would turn back.
-        before, after = (run[0] - 1) % n, (run[-1] + 1) % n
-        beside[run] = after if after in vertex and before not in vertex else before
-    beside = beside[rows]
-    owner, still, stop = np.array(front.owner), np.array(front.is_at_rest), np.array(front.stop)
+        row_before, row_after = (run[0] - 1) % n, (run[-1] + 1) % n
+        neighbour[run] = (
+            row_after if row_after in vertex and row_before not in vertex else row_before
+        )
+    neighbour = neighbour[rows]
+    owner, is_at_rest, stop = (
+        np.array(front.owner),
+        np.array(front.is_at_rest),
+        np.array(front.stop),
+    )
     remains = np.ones(len(front.x), dtype=bool)
     remains[owner[rows]] = False
-    owner[rows] = owner[beside]
-    still[rows], stop[rows] = False, front.x[owner[beside]]
+    owner[rows] = owner[neighbour]
+    is_at_rest[rows], stop[rows] = False, front.x[owner[neighbour]]
     number = np.cumsum(remains) - 1
     return replace(
         front,
         x=front.x[remains],
         is_pinned=front.is_pinned[remains],
         owner=number[owner],
-        is_at_rest=still,
+        is_at_rest=is_at_rest,
         stop=stop,
     )
 
 
-def must_be_free(x: Floats, size: float, body: Body | None, meets: Floats) -> Bools:
+def must_be_free(x: Floats, size: float, body: Body | None, meeting_points: Floats) -> Bools:
     """Which points of a front lie in the body, and not beside others that it meets `(n,)`."""
     if body is None:
         return np.ones(len(x), dtype=bool)
-    free = body.contains(x)
-    if len(meets):
-        free &= cKDTree(meets).query(x)[0] > _BESIDE * size
-    return np.asarray(free)
+    is_free = body.contains(x)
+    if len(meeting_points):
+        is_free &= cKDTree(meeting_points).query(x)[0] > _BESIDE * size
+    return np.asarray(is_free)
 
 
 def _stopped_in_holes(front: FrontChain, size: float, body: Body) -> FrontChain:
@@ -132,15 +140,15 @@ def _stopped_in_holes(front: FrontChain, size: float, body: Body) -> FrontChain:
     share = np.linspace(0.0, 1.0, _SAMPLES + 1)
     move = front.stop - front.start
     depth, _ = body.depth((front.start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
-    outside = depth.reshape(len(move), -1) > 0
-    first = np.argmax(outside, axis=1)
-    again = ~outside & (np.arange(_SAMPLES + 1) > first[:, None])
-    last = np.argmax(again, axis=1)
-    comes_back = ~outside[:, 0] & outside.any(axis=1) & again.any(axis=1)
+    is_outside = depth.reshape(len(move), -1) > 0
+    first = np.argmax(is_outside, axis=1)
+    is_inside_again = ~is_outside & (np.arange(_SAMPLES + 1) > first[:, None])
+    last = np.argmax(is_inside_again, axis=1)
+    comes_back = ~is_outside[:, 0] & is_outside.any(axis=1) & is_inside_again.any(axis=1)
     width = (share[last] - share[first]) * np.linalg.norm(move, axis=1)
     comes_back &= width > _HOLE * size
-    most = np.where(comes_back, (share[first] + share[last]) / 2, 1.0)
-    return _short_ways(front, most, size)
+    largest_share = np.where(comes_back, (share[first] + share[last]) / 2, 1.0)
+    return _short_ways(front, largest_share, size)
 
 
 def _short_ways(front: FrontChain, share: Floats, size: float) -> FrontChain:
@@ -148,11 +156,11 @@ def _short_ways(front: FrontChain, share: Floats, size: float) -> FrontChain:
     if not (share < 1).any():
         return front
     move = share[:, None] * (front.stop - front.start)
-    stays = front.is_at_rest | ((share < 1) & (np.linalg.norm(move, axis=1) < _LEAST * size))
+    is_staying = front.is_at_rest | ((share < 1) & (np.linalg.norm(move, axis=1) < _LEAST * size))
     return chain(
         front.start,
-        np.where(stays[:, None], front.start, front.start + move),
-        stays,
+        np.where(is_staying[:, None], front.start, front.start + move),
+        is_staying,
         front.is_closed,
     )
 
@@ -176,34 +184,43 @@ def _stopped_at_fronts(
 ) -> tuple[list[FrontChain | None], Floats]:
     """Ways of two fronts that lead to each other end before they meet; where they would have."""
     share = [np.ones(0) if front is None else np.ones(len(front.x)) for front in fronts]
-    meets = [np.zeros((0, 3))]
-    for i, mine, j, others in _facing_parts(fronts):
-        for a, p, b, q in ((i, mine, j, others), (j, others, i, mine)):
+    meeting_points = [np.zeros((0, 3))]
+    for i, rows_of_one, j, others in _facing_parts(fronts):
+        for a, p, b, q in ((i, rows_of_one, j, others), (j, others, i, rows_of_one)):
             one, other = fronts[a], fronts[b]
             assert one is not None
             assert other is not None
-            way, back = one.stop[p] - one.start[p], other.stop[q] - other.start[q]
-            reach = float(np.linalg.norm(way, axis=1).max() + np.linalg.norm(back, axis=1).max())
+            way, opposite_way = one.stop[p] - one.start[p], other.stop[q] - other.start[q]
+            reach = float(
+                np.linalg.norm(way, axis=1).max() + np.linalg.norm(opposite_way, axis=1).max()
+            )
             distance, nearest = cKDTree(other.start[q]).query(
                 one.start[p], distance_upper_bound=reach + _ROOM * size
             )
             rows = np.nonzero(np.isfinite(distance) & (distance > 0))[0]
             rows = rows[body.contains(one.start[p[rows]])]
             gap, k = distance[rows], nearest[rows]
-            across = (other.start[q[k]] - one.start[p[rows]]) / gap[:, None]
-            ahead = np.einsum("ij,ij->i", way[rows], across)
-            towards = -np.einsum("ij,ij->i", back[k], across)
-            long, wide = np.linalg.norm(way[rows], axis=1), np.linalg.norm(back[k], axis=1)
-            hit = (ahead >= _FACES * long) & (towards >= _FACES * wide)
-            hit &= ahead + towards > gap - _ROOM * size
-            part = np.maximum(gap - _ROOM * size, 0.0)[hit] / (ahead + towards)[hit]
+            gap_direction = (other.start[q[k]] - one.start[p[rows]]) / gap[:, None]
+            advance_of_one = np.einsum("ij,ij->i", way[rows], gap_direction)
+            advance_of_other = -np.einsum("ij,ij->i", opposite_way[k], gap_direction)
+            way_length, opposite_length = (
+                np.linalg.norm(way[rows], axis=1),
+                np.linalg.norm(opposite_way[k], axis=1),
+            )
+            hit = (advance_of_one >= _FACES * way_length) & (
+                advance_of_other >= _FACES * opposite_length
+            )
+            hit &= advance_of_one + advance_of_other > gap - _ROOM * size
+            part = (
+                np.maximum(gap - _ROOM * size, 0.0)[hit] / (advance_of_one + advance_of_other)[hit]
+            )
             np.minimum.at(share[a], p[rows[hit]], part)
-            meets.append((one.start[p[rows]] + other.start[q[k]])[hit] / 2)
+            meeting_points.append((one.start[p[rows]] + other.start[q[k]])[hit] / 2)
     result = [
         None if front is None else _short_ways(front, part, size)
         for front, part in zip(fronts, share)
     ]
-    return result, np.concatenate(meets)
+    return result, np.concatenate(meeting_points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,17 +272,17 @@ def _with_ends_outside(
     gaps: list[list[_Gap]] = []
     for k, front in enumerate(fronts):
         gaps.append([] if front is None else _gaps(k, front, ends, size, body))
-    meets = [np.zeros((0, 3))]
+    meeting_points = [np.zeros((0, 3))]
     for i in range(len(ends)):
         for j in range(i):
             if np.linalg.norm(ends[i].path[0] - ends[j].path[0]) < _BESIDE * size:
-                meets.append((ends[i].path[:1] + ends[j].path[:1]) / 2)
+                meeting_points.append((ends[i].path[:1] + ends[j].path[:1]) / 2)
             ends[i], ends[j] = _cut_where_crossing(ends[i], ends[j], size)
     result = [
         None if front is None else _led_on(front, gap, ends, size, body)
         for front, gap in zip(fronts, gaps)
     ]
-    return result, np.concatenate(meets)
+    return result, np.concatenate(meeting_points)
 
 
 def _gaps(
@@ -273,33 +290,39 @@ def _gaps(
 ) -> list[_Gap]:
     """Where a front lies outside the body; its ends there are added to a list."""
     n = len(front.x)
-    before, after = body.contains(front.start), body.contains(front.stop)
-    if before.all() or not (before & after).any():
+    is_inside_before, is_inside_after = body.contains(front.start), body.contains(front.stop)
+    if is_inside_before.all() or not (is_inside_before & is_inside_after).any():
         return []
     result = []
-    for run in runs_of(~before) if front.is_closed else open_runs(~before):
+    for run in runs_of(~is_inside_before) if front.is_closed else open_runs(~is_inside_before):
         sides = []
         for reverse in (False, True):
             row = run[::-1] if reverse else run
             step = -1 if reverse else 1
-            back = row[0] - step * np.arange(1, n)
-            back = back % n if front.is_closed else back[(back >= 0) & (back < n)]
+            rows_back = row[0] - step * np.arange(1, n)
+            rows_back = (
+                rows_back % n if front.is_closed else rows_back[(rows_back >= 0) & (rows_back < n)]
+            )
             # As far back as the front lay in the body before.
-            back = back[: int(np.argmin(before[back]))] if not before[back].all() else back
-            order = np.concatenate([back[::-1], row])
-            first = len(back)  # the first ray that started outside
-            inside = np.nonzero(after[order[: first + 1]])[0]
-            if not len(back) or not len(inside):
+            rows_back = (
+                rows_back[: int(np.argmin(is_inside_before[rows_back]))]
+                if not is_inside_before[rows_back].all()
+                else rows_back
+            )
+            order = np.concatenate([rows_back[::-1], row])
+            first = len(rows_back)  # the first ray that started outside
+            rows_inside = np.nonzero(is_inside_after[order[: first + 1]])[0]
+            if not len(rows_back) or not len(rows_inside):
                 sides.append(-1)  # it ends here, or what lay in the body has left it
                 continue
-            leaves = min(int(inside[-1]) + 1, first)
+            leaves = min(int(rows_inside[-1]) + 1, first)
             base = int(order[leaves])
             way = _lead_out(front.stop[order[: leaves + 1]], size, body)
             path = front.stop[base][None]
             if way is not None:
                 path = np.stack([path[0], path[0] + way])
             sides.append(len(ends))
-            ends.append(_FrontEnd(number, base, bool(after[base]), path))
+            ends.append(_FrontEnd(number, base, bool(is_inside_after[base]), path))
         if max(sides) >= 0:
             result.append(_Gap(run, (sides[0], sides[1])))
     return result
@@ -307,14 +330,14 @@ def _gaps(
 
 def _lead_out(x: Floats, size: float, body: Body) -> Floats | None:
     """Vector by which a front goes straight on from its last point; None where none leads out."""
-    away = np.linalg.norm(x - x[-1], axis=1)
-    behind = np.nonzero(away > _TANGENT * size)[0]
-    begin = int(behind[-1]) if len(behind) else 0
-    if away[begin] == 0:
+    distance = np.linalg.norm(x - x[-1], axis=1)
+    rows_behind = np.nonzero(distance > _TANGENT * size)[0]
+    begin = int(rows_behind[-1]) if len(rows_behind) else 0
+    if distance[begin] == 0:
         return None
-    ahead = (x[-1] - x[begin]) / away[begin]
-    length = way_to_middle(x[-1], ahead, float(body.cell_size(x[-1:])[0]), body)
-    return np.asarray(length * ahead) if length > _SHORT * size else None
+    tangent = (x[-1] - x[begin]) / distance[begin]
+    length = way_to_middle(x[-1], tangent, float(body.cell_size(x[-1:])[0]), body)
+    return np.asarray(length * tangent) if length > _SHORT * size else None
 
 
 def _up_to_other_walls(start: Floats, stop: Floats, body: Body) -> Floats:
@@ -323,8 +346,8 @@ def _up_to_other_walls(start: Floats, stop: Floats, body: Body) -> Floats:
     move = stop - start
     depth, size = body.depth((start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
     depth, size = depth.reshape(len(move), -1), size.reshape(len(move), -1)
-    nearer = depth < depth[:, :1] - 1e-9 * size
-    last = np.where(nearer.any(axis=1), np.argmax(nearer, axis=1) - 1, _SAMPLES)
+    is_nearer = depth < depth[:, :1] - 1e-9 * size
+    last = np.where(is_nearer.any(axis=1), np.argmax(is_nearer, axis=1) - 1, _SAMPLES)
     return np.asarray(start + share[last][:, None] * move)
 
 
@@ -336,11 +359,11 @@ def _cut_where_crossing(
         return one, other
     (x, s), (y, t) = _samples(one.path), _samples(other.path)
     gap = np.linalg.norm(x[:, None] - y[None], axis=2)
-    longer = np.maximum(s[:, None], t[None])
-    near = gap < _CROSS * size
-    if not near.any():
+    longer_way = np.maximum(s[:, None], t[None])
+    is_near = gap < _CROSS * size
+    if not is_near.any():
         return one, other
-    i, j = np.unravel_index(np.argmin(np.where(near, longer, np.inf)), near.shape)
+    i, j = np.unravel_index(np.argmin(np.where(is_near, longer_way, np.inf)), is_near.shape)
     return _cut(one, float(s[i]), size), _cut(other, float(t[j]), size)
 
 
@@ -362,8 +385,8 @@ def _point_on_path(path: Floats, at: Floats) -> Floats:
 
 def _cut(end: _FrontEnd, length: float, size: float) -> _FrontEnd:
     """An end up to an arc length."""
-    whole = float(_arc(end.path)[-1])
-    if length >= whole:
+    total = float(_arc(end.path)[-1])
+    if length >= total:
         return end
     if length < _SHORT * size:
         return replace(end, path=end.path[:1])
@@ -377,8 +400,8 @@ def _led_on(
     if not gaps:
         return front
     n = len(front.x)
-    stop, still, owner = np.array(front.stop), np.array(front.is_at_rest), np.arange(n)
-    outside = np.zeros(n, dtype=bool)
+    stop, is_at_rest, owner = np.array(front.stop), np.array(front.is_at_rest), np.arange(n)
+    is_outside = np.zeros(n, dtype=bool)
     for gap in gaps:
         first, last = (ends[k] if k >= 0 else None for k in gap.ends)
         begin = int(gap.rays[0]) - 1 if first is None else first.base
@@ -392,21 +415,21 @@ def _led_on(
         if not len(target):
             base = first if first is not None else last
             assert base is not None
-            owner[rays], stop[rays], still[rays] = base.base, base.path[0], False
+            owner[rays], stop[rays], is_at_rest[rays] = base.base, base.path[0], False
             continue
         # What would turn behind the old end stays there: outside, faces need not follow it.
         way = front.stop[rays] - front.start[rays]
-        ahead = np.einsum("ij,ij->i", target - front.start[rays], way)
-        stays = ahead <= _LEAST * size * np.linalg.norm(way, axis=1)
-        stop[rays] = np.where(stays[:, None], front.start[rays], target)
-        still[rays], outside[rays[bends]] = stays, True
+        advance = np.einsum("ij,ij->i", target - front.start[rays], way)
+        is_staying = advance <= _LEAST * size * np.linalg.norm(way, axis=1)
+        stop[rays] = np.where(is_staying[:, None], front.start[rays], target)
+        is_at_rest[rays], is_outside[rays[bends]] = is_staying, True
     remains = owner == np.arange(n)
-    pinned = (still | outside)[remains]
+    is_pinned = (is_at_rest | is_outside)[remains]
     if not front.is_closed:
-        pinned[[0, -1]] = True
+        is_pinned[[0, -1]] = True
     number = np.cumsum(remains) - 1
     return FrontChain(
-        stop[remains], front.is_closed, pinned, front.start, stop, still, number[owner]
+        stop[remains], front.is_closed, is_pinned, front.start, stop, is_at_rest, number[owner]
     )
 
 
@@ -419,23 +442,23 @@ def _way_across(
     body: Body,
 ) -> tuple[Floats, Ints]:
     """Where the rays of a gap go, none where the front ends before, and at which it bends."""
-    start, none = front.start[rays], np.zeros(0, dtype=np.int64)
+    start, no_bends = front.start[rays], np.zeros(0, dtype=np.int64)
     if first is None or last is None:
         end = first if first is not None else last
         assert end is not None
-        outwards = start if first is not None else start[::-1]
+        points_outwards = start if first is not None else start[::-1]
         if len(end.path) > 1:
-            s = _arc(np.concatenate([front.start[[end.base]], outwards]))
+            s = _arc(np.concatenate([front.start[[end.base]], points_outwards]))
             way = _point_on_path(end.path, s[1:] / s[-1] * _arc(end.path)[-1])
-            return (way if first is not None else way[::-1]), none
+            return (way if first is not None else way[::-1]), no_bends
         if end.is_inside:
-            return _up_to_other_walls(start, front.stop[rays], body), none
-        return np.zeros((0, 3)), none
+            return _up_to_other_walls(start, front.stop[rays], body), no_bends
+        return np.zeros((0, 3)), no_bends
     link = np.linspace(0.0, 1.0, 4 * _SAMPLES + 1)[:, None] * (last.path[-1] - first.path[-1])
     width = float(np.linalg.norm(link[-1]))
     if float(body.contains(first.path[-1] + link).mean()) * width > _THROUGH * size:
         # Other walls lie between: faces go on up to them.
-        return _up_to_other_walls(start, front.stop[rays], body), none
+        return _up_to_other_walls(start, front.stop[rays], body), no_bends
     path = np.concatenate([first.path, last.path[::-1]])
     inner = path[1:-1]
     if len(inner) == 2 and width < size:
@@ -445,11 +468,11 @@ def _way_across(
     share = _arc(path)[1:-1] / _arc(path)[-1]
     bends = np.unique(np.abs(s[1:-1, None] / s[-1] - share).argmin(axis=0))
     if len(bends) < len(inner):
-        inner, bends = inner[:0], none
+        inner, bends = inner[:0], no_bends
     # A bend falls on a ray, and the others lie evenly between.
-    known = np.concatenate([[0], bends + 1, [len(s) - 1]])
-    whole = np.concatenate([path[:1], inner, path[-1:]])
-    at = np.interp(s[1:-1], s[known], np.arange(len(known)))
+    known_rows = np.concatenate([[0], bends + 1, [len(s) - 1]])
+    full_path = np.concatenate([path[:1], inner, path[-1:]])
+    at = np.interp(s[1:-1], s[known_rows], np.arange(len(known_rows)))
     return np.stack(
-        [np.interp(at, np.arange(len(known)), whole[:, k]) for k in range(3)], axis=1
+        [np.interp(at, np.arange(len(known_rows)), full_path[:, k]) for k in range(3)], axis=1
     ), bends

@@ -51,62 +51,70 @@ def open_fronts(
     x = points[loop]
     depth, _ = body.depth(x)
     size = body.cell_size(x)
-    outward, normal = _outward_directions(points, faces, loop)
+    outward_direction, normal = _outward_directions(points, faces, loop)
     runs = runs_of(outline.is_inside)
-    movable = outline.candidate | np.roll(outline.candidate, 1)
-    before: dict[int, Ints] = {}
-    after: dict[int, Ints] = {}
+    is_movable = outline.candidate | np.roll(outline.candidate, 1)
+    points_before: dict[int, Ints] = {}
+    points_after: dict[int, Ints] = {}
     for mouth in runs_of(~outline.is_inside):
         vertex = np.append(mouth, (mouth[-1] + 1) % m) if runs else mouth
         offset = np.zeros((len(vertex), 3))
-        inner = np.array(movable[vertex])
+        inner = np.array(is_movable[vertex])
         if runs:
             room = (len(mouth) - 1) // 2
-            old = outline.candidate[mouth] & (not outline.first_time)
-            deepest = int(vertex[np.argmax(depth[vertex])])
-            if _passes_hole(x, mouth, deepest, outward, normal, old, body):
+            is_old = outline.candidate[mouth] & (not outline.first_time)
+            deepest_point = int(vertex[np.argmax(depth[vertex])])
+            if _passes_hole(x, mouth, deepest_point, outward_direction, normal, is_old, body):
                 first, last = _across_hole(depth[vertex], size[vertex])
-                after[int(vertex[0])] = loop[vertex[1 : first + 1]]
-                before[int(vertex[-1])] = loop[vertex[last:-1]]
+                points_after[int(vertex[0])] = loop[vertex[1 : first + 1]]
+                points_before[int(vertex[-1])] = loop[vertex[last:-1]]
                 continue
-            ways = (x, depth, size, outward)
-            most = _INSIDE[0] if outline.first_time else _INSIDE[1]
-            first, offset[0] = _led_out(*ways, vertex, old, room, most, body)
-            stop, offset[-1] = _led_out(*ways, vertex[::-1], old[::-1], room, most, body)
+            ways = (x, depth, size, outward_direction)
+            largest_length = _INSIDE[0] if outline.first_time else _INSIDE[1]
+            first, offset[0] = _led_out(*ways, vertex, is_old, room, largest_length, body)
+            stop, offset[-1] = _led_out(
+                *ways, vertex[::-1], is_old[::-1], room, largest_length, body
+            )
             last = len(vertex) - 1 - stop
-            after[int(vertex[0])] = loop[vertex[1 : first + 1]]
-            before[int(vertex[-1])] = loop[vertex[last:-1]]
+            points_after[int(vertex[0])] = loop[vertex[1 : first + 1]]
+            points_before[int(vertex[-1])] = loop[vertex[last:-1]]
             ends = offset[[0, -1]]
             start, vertex = int(vertex[0]), vertex[first : last + 1]
             goal = int(mouth[-1] + 1) % m
             offset, inner = offset[: len(vertex)], inner[first : last + 1]
             offset[[0, -1]] = ends
             inner[[0, -1]] = False
-        way = _side_by_side(x[vertex], outward[vertex], offset) if runs else outward[vertex]
+        way = (
+            _side_by_side(x[vertex], outward_direction[vertex], offset)
+            if runs
+            else outward_direction[vertex]
+        )
         offset[inner] = _push_vectors(
             x[vertex[inner]], way[inner], depth[vertex[inner]], size[vertex[inner]],
             body, outline.first_time,
         )  # fmt: skip
         offset = _untangled_rays(x, vertex, offset, normal, not runs)
-        long = np.linalg.norm(offset, axis=1)
-        if not long.any():
+        offset_length = np.linalg.norm(offset, axis=1)
+        if not offset_length.any():
             continue
-        layers = int(np.ceil((long / (SIDE * size[vertex])).max()))
+        layers = int(np.ceil((offset_length / (SIDE * size[vertex])).max()))
         number = len(points) + np.arange(layers)
-        new, strip = ruled_strip(len(points), loop[vertex], x[vertex], offset, layers, not runs)
-        if runs and long[0] > 0:
-            after[start] = np.append(after[start], number)
-        if runs and long[-1] > 0:
-            chain = number + (int((long > 0).sum()) - 1) * layers
-            before[goal] = np.append(chain[::-1], before[goal])
-        points, faces = np.concatenate([points, new]), np.concatenate([faces, strip])
+        new_points, strip = ruled_strip(
+            len(points), loop[vertex], x[vertex], offset, layers, not runs
+        )
+        if runs and offset_length[0] > 0:
+            points_after[start] = np.append(points_after[start], number)
+        if runs and offset_length[-1] > 0:
+            chain = number + (int((offset_length > 0).sum()) - 1) * layers
+            points_before[goal] = np.append(chain[::-1], points_before[goal])
+        points, faces = np.concatenate([points, new_points]), np.concatenate([faces, strip])
     fronts = [
         np.concatenate(
             [
-                before[int(run[0])],
+                points_before[int(run[0])],
                 loop[run],
                 loop[[(run[-1] + 1) % m]],
-                after[int(run[-1] + 1) % m],
+                points_after[int(run[-1] + 1) % m],
             ]
         )
         for run in runs
@@ -134,52 +142,63 @@ def is_enclosed(x: Floats, normal: Floats, body: Body) -> Bools:
     if result.any():
         corner, angle = body.mesh.points, 2 * np.pi * (np.arange(_AROUND) + 0.3) / _AROUND
         reach = float(np.linalg.norm(corner.max(axis=0) - corner.min(axis=0)))
-        least = np.eye(3)[np.argmin(np.abs(normal[result]), axis=1)]
-        one = unit(np.cross(normal[result], least))
+        axis = np.eye(3)[np.argmin(np.abs(normal[result]), axis=1)]
+        one = unit(np.cross(normal[result], axis))
         other = np.cross(normal[result], one)
         way = np.cos(angle)[:, None] * one[:, None] + np.sin(angle)[:, None] * other[:, None]
         start = np.repeat(x[result], _AROUND, axis=0)
-        crossed, _ = first_crossing(body.boundary, start, start + reach * way.reshape(-1, 3))
-        blocked = (crossed.reshape(-1, _AROUND) >= 0).sum(axis=1)
-        result[result] = blocked >= _AROUND - _OPEN
+        triangle_hit, _ = first_crossing(body.boundary, start, start + reach * way.reshape(-1, 3))
+        n_blocked = (triangle_hit.reshape(-1, _AROUND) >= 0).sum(axis=1)
+        result[result] = n_blocked >= _AROUND - _OPEN
     return result
 
 
-def is_at_hole(x: Floats, ahead: Floats, normal: Floats, body: Body) -> bool:
+def is_at_hole(x: Floats, direction: Floats, normal: Floats, body: Body) -> bool:
     """Whether a point of an outline lies in a hole, or comes to one on its way straight ahead."""
     depth, size = (float(value[0]) for value in body.depth(x[None]))
     if depth <= ON * size:
-        x = x + (_BEFORE * size - depth) * ahead
+        x = x + (_BEFORE * size - depth) * direction
     return bool(is_enclosed(x[None], normal[None], body)[0])
 
 
 def _passes_hole(
-    x: Floats, mouth: Ints, deepest: int, outward: Floats, normal: Floats, old: Bools, body: Body
+    x: Floats,
+    mouth: Ints,
+    deepest_point: int,
+    outward_direction: Floats,
+    normal: Floats,
+    is_old: Bools,
+    body: Body,
 ) -> bool:
     """Whether a front goes on across a mouth: it did before, or is drawn straight across a hole."""
     m = len(x)
-    if (~old).sum() > 1:
+    if (~is_old).sum() > 1:
         first, last = int(mouth[0]), int(mouth[-1] + 1) % m
         way = unit(x[last] - x[first])
-        back, along = unit(x[first] - x[first - 1]), unit(x[(last + 1) % m] - x[last])
-        if old.any() or min(back @ way, along @ way) < _STRAIGHT:
+        direction_back, direction_on = (
+            unit(x[first] - x[first - 1]),
+            unit(x[(last + 1) % m] - x[last]),
+        )
+        if is_old.any() or min(direction_back @ way, direction_on @ way) < _STRAIGHT:
             return False
-    return is_at_hole(x[deepest], outward[deepest], normal[deepest], body)
+    return is_at_hole(
+        x[deepest_point], outward_direction[deepest_point], normal[deepest_point], body
+    )
 
 
 def behind_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body) -> Bools:
     """Sides in the body, of what was front before, that have just come out of a hole `(m,)`."""
     result = np.zeros(len(outline.loop), dtype=bool)
     x = points[outline.loop]
-    outward, normal = _outward_directions(points, faces, outline.loop)
+    outward_direction, normal = _outward_directions(points, faces, outline.loop)
     depth, size = body.depth((x + np.roll(x, -1, axis=0)) / 2)
     for run in runs_of(~outline.is_inside):
         if outline.candidate[run].all() and (depth[run] <= _GRAZE * size[run]).all():
             k = run[np.argmax(depth[run])]
             # Behind a hole the way back leads into it, before one into the body.
-            back = max(_GRAZE + _BEFORE, _BEFORE - float(depth[k] / size[k])) * size[k]
-            behind = (x[k] + x[(k + 1) % len(x)]) / 2 - back * outward[k]
-            result[run] = is_enclosed(behind[None], normal[k : k + 1], body)[0]
+            distance_back = max(_GRAZE + _BEFORE, _BEFORE - float(depth[k] / size[k])) * size[k]
+            place_behind = (x[k] + x[(k + 1) % len(x)]) / 2 - distance_back * outward_direction[k]
+            result[run] = is_enclosed(place_behind[None], normal[k : k + 1], body)[0]
     return result
 
 
@@ -194,8 +213,8 @@ def under_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body) 
     outward, _ = _outward_directions(points, faces, outline.loop)
     for run in runs_of(~outline.is_inside):
         if len(run) < len(x) and outline.candidate[run].all():
-            ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward[run]
-            depth = body.depth(np.concatenate([middle[run], ahead]))[0]
+            place_ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward[run]
+            depth = body.depth(np.concatenate([middle[run], place_ahead]))[0]
             result[run] = (depth < 0).all()
     return result
 
@@ -205,9 +224,9 @@ def _across_hole(depth: Floats, size: Floats) -> tuple[int, int]:
 
     To one side in its middle, or until they are far enough outside.
     """
-    far = np.nonzero(depth >= 0.999 * OUTSIDE * size)[0]
-    if len(far) > 1:
-        return int(far[0]), int(far[-1])
+    far_points = np.nonzero(depth >= 0.999 * OUTSIDE * size)[0]
+    if len(far_points) > 1:
+        return int(far_points[0]), int(far_points[-1])
     first = int(np.argmax(depth[:-1] + depth[1:]))
     return first, first + 1
 
@@ -220,47 +239,49 @@ def _outward_directions(points: Floats, faces: Ints, loop: Ints) -> tuple[Floats
     order = np.argsort(key)
     side = np.searchsorted(key[order], loop * n + np.roll(loop, -1))
     normal = face_normals(points, faces[owner[order[side]]])
-    along = np.roll(points[loop], -1, axis=0) - points[loop]
-    one = unit(np.cross(normal, along))
+    next_side = np.roll(points[loop], -1, axis=0) - points[loop]
+    one = unit(np.cross(normal, next_side))
     return unit(one + np.roll(one, 1, axis=0)), normal
 
 
-def _side_by_side(x: Floats, outward: Floats, offset: Floats) -> Floats:
+def _side_by_side(x: Floats, outward_direction: Floats, offset: Floats) -> Floats:
     """Ways out along a mouth that turn towards the rays at its ends, so that none are crossed."""
     length = np.linalg.norm(np.diff(x, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(length)])
-    slack, mixed = np.ones(len(x)), np.zeros_like(x)
-    for end, away in ((0, s), (-1, s[-1] - s)):
-        long = float(np.linalg.norm(offset[end]))
-        if long > 0:
-            weight = np.maximum(1 - away / (2 * long), 0)
-            mixed += weight[:, None] * offset[end] / long
+    slack, direction = np.ones(len(x)), np.zeros_like(x)
+    for end, distance in ((0, s), (-1, s[-1] - s)):
+        offset_length = float(np.linalg.norm(offset[end]))
+        if offset_length > 0:
+            weight = np.maximum(1 - distance / (2 * offset_length), 0)
+            direction += weight[:, None] * offset[end] / offset_length
             slack -= weight
-    return unit(mixed + np.maximum(slack, 0)[:, None] * outward)
+    return unit(direction + np.maximum(slack, 0)[:, None] * outward_direction)
 
 
 def _untangled_rays(
-    x: Floats, vertex: Ints, offset: Floats, normal: Floats, closed: bool
+    x: Floats, vertex: Ints, offset: Floats, normal: Floats, is_closed: bool
 ) -> Floats:
     """Rays of a mouth made even where neighbours cross, those at its ends as they are."""
     offset = np.array(offset)
     for _ in range(40):
         a, o = x[vertex], offset
-        if closed:
+        if is_closed:
             a, o = np.append(a, a[:1], axis=0), np.append(o, o[:1], axis=0)
-        along, outer_sides = np.diff(a, axis=0), np.diff(a + o, axis=0)
-        n = normal[vertex[: len(along)]]
-        turned = np.zeros(len(along), dtype=bool)
-        for one, other in ((along, along + o[1:]), (along + o[1:], o[:-1])):
+        inner_sides, outer_sides = np.diff(a, axis=0), np.diff(a + o, axis=0)
+        n = normal[vertex[: len(inner_sides)]]
+        is_turned = np.zeros(len(inner_sides), dtype=bool)
+        for one, other in ((inner_sides, inner_sides + o[1:]), (inner_sides + o[1:], o[:-1])):
             area = np.einsum("ij,ij->i", np.cross(one, other), n)
-            turned |= area < -1e-12 * np.einsum("ij,ij->i", outer_sides, outer_sides)
-        if not turned.any():
+            is_turned |= area < -1e-12 * np.einsum("ij,ij->i", outer_sides, outer_sides)
+        if not is_turned.any():
             break
-        moved = turned | np.roll(turned, 1) if closed else np.zeros(len(vertex), dtype=bool)
-        if not closed:
-            moved[1:-1] = turned[1:] | turned[:-1]
-        even = (np.roll(offset, 1, axis=0) + 2 * offset + np.roll(offset, -1, axis=0)) / 4
-        offset[moved] = even[moved]
+        is_moved = (
+            is_turned | np.roll(is_turned, 1) if is_closed else np.zeros(len(vertex), dtype=bool)
+        )
+        if not is_closed:
+            is_moved[1:-1] = is_turned[1:] | is_turned[:-1]
+        mean_offset = (np.roll(offset, 1, axis=0) + 2 * offset + np.roll(offset, -1, axis=0)) / 4
+        offset[is_moved] = mean_offset[is_moved]
     return offset
 
 
@@ -268,72 +289,84 @@ def _led_out(
     x: Floats,
     depth: Floats,
     size: Floats,
-    outward: Floats,
+    outward_direction: Floats,
     vertex: Ints,
-    old: Bools,
+    is_old: Bools,
     room: int,
-    most: float,
+    largest_length: float,
     body: Body,
 ) -> tuple[int, Floats]:
     """How a front goes on from its last point `vertex[0]` until it is two cells outside.
 
-    It follows the outline while this is smooth, and always where it was front before (`old`), or
-    where no way leads out with less than `most` cells of the body on it.
+    It follows the outline while this is smooth, and always where it was front before (`is_old`), or
+    where no way leads out with less than `largest_length` cells of the body on it.
     Returns the number of points along the outline that it takes over, and a vector by which it
     goes on straight from there (zero where the outline itself leads far enough).
     """
     m = len(x)
     step = int((vertex[1] - vertex[0] + 1) % m) - 1
-    along = unit(x[vertex[0]] - x[(vertex[0] - step) % m])
-    tangent, leaves, corner, followed = along, -1, False, False
+    tangent_in = unit(x[vertex[0]] - x[(vertex[0] - step) % m])
+    tangent, leaves, corner, has_followed = tangent_in, -1, False, False
     for k in range(room + 1):
         at = vertex[k]
         if leaves < 0 and depth[at] >= -ON * size[at]:
-            leaves, tangent = k, along
-        enough = _LEAST if k > 0 and old[k - 1] and not old[k] else 0.999 * OUTSIDE
-        if depth[at] >= enough * size[at]:
+            leaves, tangent = k, tangent_in
+        least_depth = _LEAST if k > 0 and is_old[k - 1] and not is_old[k] else 0.999 * OUTSIDE
+        if depth[at] >= least_depth * size[at]:
             return k, np.zeros(3)
-        if not followed and depth[at] >= _LEAST * size[at]:
-            leaves, tangent, followed = k, along, True
-        following = unit(x[vertex[k + 1]] - x[at])
+        if not has_followed and depth[at] >= _LEAST * size[at]:
+            leaves, tangent, has_followed = k, tangent_in, True
+        tangent_out = unit(x[vertex[k + 1]] - x[at])
         # Round a hollow corner the outline leads on; straight on lies the surface itself.
-        corner = bool(following @ along < SMOOTH and following @ outward[at] < 0) and not old[k]
-        turns_round = depth[at] > 0 and depth[vertex[k + 1]] < depth[at] and not old[k]
+        corner = (
+            bool(tangent_out @ tangent_in < SMOOTH and tangent_out @ outward_direction[at] < 0)
+            and not is_old[k]
+        )
+        turns_round = depth[at] > 0 and depth[vertex[k + 1]] < depth[at] and not is_old[k]
         if corner or turns_round or k == room:
             # From a corner the front goes on straight; an outline that turns round is left
             # where it is out of reach, or else where it comes out of the body.
             if corner or leaves < 0:
-                leaves, tangent = k, along
+                leaves, tangent = k, tangent_in
             break
-        along = following
+        tangent_in = tangent_out
     at = vertex[leaves]
-    way = outward[at]
-    across = x[vertex[-1 - leaves]] - x[at]
-    width = float(np.linalg.norm(across))
+    way = outward_direction[at]
+    gap = x[vertex[-1 - leaves]] - x[at]
+    width = float(np.linalg.norm(gap))
     # Beside an outline that turns round its own tangent leaves no room for the mouth.
     ways = [unit(tangent + way), way]
     ways.insert(0 if corner else 2, tangent)
     for direction in ways:
-        offset = _straight_out(x[at], direction, float(size[at]), most, body)
-        closer = float(offset @ across) / width
-        if closer > _MEET * width:
+        offset = _straight_out(x[at], direction, float(size[at]), largest_length, body)
+        share = float(offset @ gap) / width
+        if share > _MEET * width:
             # The front at the other end of this mouth would be met outside the body.
-            straight = direction - (direction @ across) * across / width**2
-            offset = _straight_out(x[at], unit(straight + 1e-3 * way), float(size[at]), most, body)
+            direction_off_gap = direction - (direction @ gap) * gap / width**2
+            offset = _straight_out(
+                x[at], unit(direction_off_gap + 1e-3 * way), float(size[at]), largest_length, body
+            )
         if offset.any():
             return leaves, offset
-    farthest = int(np.argmax(depth[vertex[: room + 1]]))
-    return farthest if depth[vertex[farthest]] > 0 else leaves, np.zeros(3)
+    deepest_row = int(np.argmax(depth[vertex[: room + 1]]))
+    return deepest_row if depth[vertex[deepest_row]] > 0 else leaves, np.zeros(3)
 
 
-def _straight_out(x: Floats, direction: Floats, size: float, most: float, body: Body) -> Floats:
+def _straight_out(
+    x: Floats, direction: Floats, size: float, largest_length: float, body: Body
+) -> Floats:
     """Vector by which the end of a front goes on, no shorter than a side; zero: no way out."""
-    length = _way_out(x[None], direction[None], np.array([size]), OUTSIDE, most, body)[0]
+    length = _way_out(x[None], direction[None], np.array([size]), OUTSIDE, largest_length, body)[0]
     return np.asarray(direction * (max(length, SIDE * size) if length > 0 else 0.0))
 
 
 def _way_out(
-    x: Floats, direction: Floats, size: Floats, target_depth: float, most: float, body: Body
+    x: Floats,
+    direction: Floats,
+    size: Floats,
+    target_depth: float,
+    largest_length: float,
+    body: Body,
 ) -> Floats:
     """Lengths by which points move until they are some cells outside; zero: no way out.
 
@@ -347,7 +380,7 @@ def _way_out(
         Of the cells.
     target_depth : float
         Cells that the points shall lie outside.
-    most : float
+    largest_length : float
         Cells of the body on the way.
     body : Body
 
@@ -360,21 +393,25 @@ def _way_out(
     every, _ = body.depth(trial.reshape(-1, 3))
     result = np.zeros(len(x))
     for k, row in enumerate(every.reshape(len(x), -1) / size[:, None]):
-        outside = row > ON
-        first = int(np.argmax(outside))
-        if not outside[first] or steps[first] > most or (first == 0 and row[1] < row[0]):
+        is_outside = row > ON
+        first = int(np.argmax(is_outside))
+        if (
+            not is_outside[first]
+            or steps[first] > largest_length
+            or (first == 0 and row[1] < row[0])
+        ):
             continue
-        again = np.nonzero(~outside[first:])[0]
-        stop = first + int(again[0]) if len(again) else len(steps)
+        rows_inside = np.nonzero(~is_outside[first:])[0]
+        stop = first + int(rows_inside[0]) if len(rows_inside) else len(steps)
         deep_enough = np.nonzero(row[first:stop] >= target_depth)[0]
         last = first + int(deep_enough[0]) if len(deep_enough) else stop - 1
-        along = _way_along_wall(row[first : last + 1])
-        if along is not None:
-            result[k] = steps[first + along]
+        way_along = _way_along_wall(row[first : last + 1])
+        if way_along is not None:
+            result[k] = steps[first + way_along]
         elif len(deep_enough) and first + deep_enough[0] > 0:
             j = first + int(deep_enough[0])
             result[k] = steps[j] - _STEP * (row[j] - target_depth) / (row[j] - row[j - 1])
-        elif len(again):
+        elif len(rows_inside):
             result[k] = (steps[first] + steps[stop]) / 2
         else:
             result[k] = steps[first] + target_depth
@@ -384,8 +421,8 @@ def _way_out(
 def _way_along_wall(depth: Floats) -> int | None:
     """From which sample on a way that has left the body leads along a wall; None: nowhere."""
     slope, count = _ALONG[0] * _STEP, int(_ALONG[1] / _STEP)
-    flat = np.abs(np.diff(depth)) < slope
-    for run in open_runs(flat):
+    is_flat = np.abs(np.diff(depth)) < slope
+    for run in open_runs(is_flat):
         if len(run) >= count and depth[run[0]] > ON:
             return int(run[0])
     return None
@@ -411,9 +448,9 @@ def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> floa
     """
     steps = _STEP * np.arange(int(_REACH / _STEP) + 1)
     row = body.depth(x + (steps * size)[:, None] * direction)[0] / size
-    outside = row > ON
-    first = int(np.argmax(outside))
-    if not outside[first] or (row[:first] < row[0] + _SLOPE * steps[:first] - _SLACK).any():
+    is_outside = row > ON
+    first = int(np.argmax(is_outside))
+    if not is_outside[first] or (row[:first] < row[0] + _SLOPE * steps[:first] - _SLACK).any():
         return 0.0
     falls = np.nonzero(row[first + 1 :] < row[first:-1] - 1e-9)[0]
     last = first + int(falls[0]) if len(falls) else len(steps) - 1
@@ -427,26 +464,30 @@ def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> floa
 
 
 def _push_vectors(
-    x: Floats, outward: Floats, depth: Floats, size: Floats, body: Body, first_time: bool
+    x: Floats, outward_direction: Floats, depth: Floats, size: Floats, body: Body, first_time: bool
 ) -> Floats:
     """Vectors that lead points of a mouth one cell out of the body, zero where they are there."""
     offset = np.zeros_like(x)
     is_inside = depth < 0.999 * size
     if is_inside.any():
         if first_time:
-            _check_nick(x[is_inside], outward[is_inside], depth[is_inside], size[is_inside], body)
-        length = _way_out(x[is_inside], outward[is_inside], size[is_inside], 1.0, _INSIDE[0], body)
-        offset[is_inside] = length[:, None] * outward[is_inside]
+            _check_nick(
+                x[is_inside], outward_direction[is_inside], depth[is_inside], size[is_inside], body
+            )
+        length = _way_out(
+            x[is_inside], outward_direction[is_inside], size[is_inside], 1.0, _INSIDE[0], body
+        )
+        offset[is_inside] = length[:, None] * outward_direction[is_inside]
     return offset
 
 
 def _check_nick(x: Floats, way: Floats, depth: Floats, size: Floats, body: Body) -> None:
     """Raise where a crack has just come in through the boundary that its outline is close to."""
-    inside = np.nonzero(depth < 0)[0]
-    if not len(inside):
+    inner_rows = np.nonzero(depth < 0)[0]
+    if not len(inner_rows):
         return
-    ahead, _ = body.depth(x[inside] + 0.25 * size[inside, None] * way[inside])
-    nicks = inside[ahead < depth[inside] - 0.01 * size[inside]]
+    depth_ahead, _ = body.depth(x[inner_rows] + 0.25 * size[inner_rows, None] * way[inner_rows])
+    nicks = inner_rows[depth_ahead < depth[inner_rows] - 0.01 * size[inner_rows]]
     if len(nicks):
         raise CoarseMeshError(
             f"the crack ends at {np.round(x[nicks[0]], 6).tolist()}, {-depth[nicks[0]]:.4g} inside "

@@ -62,9 +62,9 @@ class Crack:
         if not isinstance(self.ends_on, tuple) or len(self.ends_on):
             object.__setattr__(self, "ends_on", _checked_ends(self.ends_on, d))
 
-    def _numbers(self, name: str, given: Any, shape: Shape) -> Ints:
+    def _numbers(self, name: str, value: Any, shape: Shape) -> Ints:
         """Point numbers as a read-only array."""
-        array = whole_numbers(given, f"Crack: {name}", shape, error=GeometryError)
+        array = whole_numbers(value, f"Crack: {name}", shape, error=GeometryError)
         if array.size and (array.min() < 0 or array.max() >= len(self.points)):
             raise GeometryError(
                 f"Crack: {name} name points outside 0 ... {len(self.points) - 1}, such as "
@@ -95,11 +95,11 @@ class Crack:
         frame = np.zeros((len(tips), 2, 2))
         for k, tip in enumerate(tips):
             first, second = (1, 0) if tip == 0 else (tip - 1, tip)
-            along = self.points[second] - self.points[first]
-            ahead = along / np.linalg.norm(along)
-            left = np.array([-ahead[1], ahead[0]])
+            piece = self.points[second] - self.points[first]
+            direction = piece / np.linalg.norm(piece)
+            normal = np.array([-direction[1], direction[0]])
             x[k] = self.points[tip]
-            frame[k] = ahead, (-left if tip == 0 else left)
+            frame[k] = direction, (-normal if tip == 0 else normal)
         return lock(x), lock(frame)
 
     @cached_property
@@ -127,9 +127,9 @@ class Crack:
         return f"Crack({len(self.points)} points, {len(self.faces)} faces, {ends})"
 
 
-def _checked_ends(given: Any, d: int) -> tuple[tuple[int, int], ...]:
+def _checked_ends(value: Any, d: int) -> tuple[tuple[int, int], ...]:
     """Numbers of other cracks and the sides from which one ends on them."""
-    pairs = whole_numbers(given, "Crack: ends_on", (None, 2), error=GeometryError)
+    pairs = whole_numbers(value, "Crack: ends_on", (None, 2), error=GeometryError)
     if (pairs[:, 0] < 0).any() or (np.abs(pairs[:, 1]) != 1).any():
         raise GeometryError(
             f"Crack: ends_on = {pairs.tolist()}: give pairs of the number of a crack, from 0 on, "
@@ -170,9 +170,9 @@ TURN = np.radians(15.0)  # from which on a turn is a kink, and no chord of a cur
 
 def turns(points: Floats) -> Floats:
     """Angles by which a polyline `(n, 2)` turns at its inner points `(n - 2,)`, 0 to pi."""
-    along = np.diff(points, axis=0)
-    along = along / np.linalg.norm(along, axis=1)[:, None]
-    return np.arccos(np.clip((along[1:] * along[:-1]).sum(axis=1), -1, 1))
+    directions = np.diff(points, axis=0)
+    directions = directions / np.linalg.norm(directions, axis=1)[:, None]
+    return np.arccos(np.clip((directions[1:] * directions[:-1]).sum(axis=1), -1, 1))
 
 
 def kink_numbers(points: Floats) -> Ints:

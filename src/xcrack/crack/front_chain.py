@@ -67,33 +67,33 @@ class FrontChain:
         order = np.argsort(self.owner[first], kind="stable")
         return first[order], last[order]
 
-    def fixed(self) -> Bools:
+    def fixed_sides(self) -> Bools:
         """Sides that are part of the old front and remain."""
-        still = np.zeros(len(self.x), dtype=bool)
-        still[self.owner[self.is_at_rest]] = True
-        following = np.roll(still, -1)
-        return np.asarray((still & following)[: len(self.side)])
+        is_at_rest = np.zeros(len(self.x), dtype=bool)
+        is_at_rest[self.owner[self.is_at_rest]] = True
+        is_next_at_rest = np.roll(is_at_rest, -1)
+        return np.asarray((is_at_rest & is_next_at_rest)[: len(self.side)])
 
 
-def chain(start: Floats, stop: Floats, still: Bools, closed: bool) -> FrontChain:
+def chain(start: Floats, stop: Floats, is_at_rest: Bools, is_closed: bool) -> FrontChain:
     """All that was sent out, each a point of its own.
 
     Parameters
     ----------
     start, stop : (r, 3) arrays, length
         Points on the old front in its direction, and where they arrived.
-    still : (r,) array of bool
+    is_at_rest : (r,) array of bool
         Which did not move.
-    closed : bool
+    is_closed : bool
 
     Returns
     -------
     FrontChain
     """
-    pinned = np.array(still)
-    if not closed:
-        pinned[[0, -1]] = True
-    return FrontChain(stop, closed, pinned, start, stop, still, np.arange(len(start)))
+    is_pinned = np.array(is_at_rest)
+    if not is_closed:
+        is_pinned[[0, -1]] = True
+    return FrontChain(stop, is_closed, is_pinned, start, stop, is_at_rest, np.arange(len(start)))
 
 
 def merge_side(front: FrontChain, side: int, x: Floats) -> FrontChain:
@@ -117,15 +117,17 @@ def merge_side(front: FrontChain, side: int, x: Floats) -> FrontChain:
         x = front.x[one]
     elif front.is_pinned[other]:
         x = front.x[other]
-    pinned = np.array(front.is_pinned)
-    pinned[one] |= pinned[other]
+    is_pinned = np.array(front.is_pinned)
+    is_pinned[one] |= is_pinned[other]
     points = np.array(front.x)
     points[one] = x
     number = np.arange(n)
     number[other] = one
     number[number > other] -= 1
     is_other = np.arange(n) != other
-    return replace(front, x=points[is_other], is_pinned=pinned[is_other], owner=number[front.owner])
+    return replace(
+        front, x=points[is_other], is_pinned=is_pinned[is_other], owner=number[front.owner]
+    )
 
 
 def without_loops(front: FrontChain) -> FrontChain:
@@ -135,12 +137,14 @@ def without_loops(front: FrontChain) -> FrontChain:
     round first, and merging these until none is left shrinks the loop to a point.
     """
     while len(front.x) > 2:
-        side, before = front.side, front.old_side
-        forward = np.einsum("ij,ij->i", side, before) / np.einsum("ij,ij->i", before, before)
-        pinned = front.is_pinned & np.roll(front.is_pinned, -1)
-        forward[pinned[: len(side)]] = np.inf
-        worst = int(np.argmin(forward))
-        if forward[worst] > 0:
+        side, old_side = front.side, front.old_side
+        forward_share = np.einsum("ij,ij->i", side, old_side) / np.einsum(
+            "ij,ij->i", old_side, old_side
+        )
+        is_pinned_side = front.is_pinned & np.roll(front.is_pinned, -1)
+        forward_share[is_pinned_side[: len(side)]] = np.inf
+        worst = int(np.argmin(forward_share))
+        if forward_share[worst] > 0:
             break
         front = _join_side_ends(front, worst)
     return front
@@ -199,27 +203,27 @@ def faired_front(front: FrontChain, passes: int) -> FrontChain:
     weight *= (
         0.375 * 70 / 36 * weight[np.arange(n), own_column] / np.einsum("ij,ij->i", weight, weight)
     )[:, None]
-    along = tangents(front.x, front.is_closed)
+    tangent = tangents(front.x, front.is_closed)
     x = np.array(front.x)
     for _ in range(passes):
         move = -np.einsum("ij,ijk->ik", weight, x[window])
-        move -= np.einsum("ij,ij->i", move, along)[:, None] * along
+        move -= np.einsum("ij,ij->i", move, tangent)[:, None] * tangent
         x[~front.is_pinned] += move[~front.is_pinned]
     advance = np.full(n, np.inf)
     np.minimum.at(advance, front.owner, np.linalg.norm(front.stop - front.start, axis=1))
-    move, most = x - front.x, _PART * advance
+    move, largest_move = x - front.x, _PART * advance
     size = np.linalg.norm(move, axis=1)
-    move *= (np.minimum(most, size) / np.where(size > 0, size, 1.0))[:, None]
+    move *= (np.minimum(largest_move, size) / np.where(size > 0, size, 1.0))[:, None]
     return replace(front, x=np.where(front.is_pinned[:, None], front.x, front.x + move))
 
 
-def spaced_front(front: FrontChain, least: float) -> FrontChain:
+def spaced_front(front: FrontChain, least_side: float) -> FrontChain:
     """A front without short sides: of two points that are too close one is left out.
 
     Parameters
     ----------
     front : FrontChain
-    least : float, length
+    least_side : float, length
         Sides are at least that long, unless both ends are pinned or a closed front has few points.
 
     Returns
@@ -231,34 +235,34 @@ def spaced_front(front: FrontChain, least: float) -> FrontChain:
         if n <= (_FEWEST if front.is_closed else 2):
             return front
         length = np.linalg.norm(front.side, axis=1)
-        free = ~(front.is_pinned & np.roll(front.is_pinned, -1))[: len(length)]
-        tried = np.where(free, length, np.inf)
-        side = int(np.argmin(tried))
-        if tried[side] >= least:
+        is_free = ~(front.is_pinned & np.roll(front.is_pinned, -1))[: len(length)]
+        free_length = np.where(is_free, length, np.inf)
+        side = int(np.argmin(free_length))
+        if free_length[side] >= least_side:
             return front
         other = (side + 1) % n
         # The point whose neighbour on the far side is nearer can better be spared.
-        stays = side if length[side - 1] > length[other % len(length)] else other
-        front = merge_side(front, side, front.x[stays])
+        point_that_stays = side if length[side - 1] > length[other % len(length)] else other
+        front = merge_side(front, side, front.x[point_that_stays])
 
 
 def without_notches(front: FrontChain) -> FrontChain:
     """A front without hollow corners of less than 80 degrees; what lies in them is passed over."""
     n = len(front.x)
     side = front.side
-    back = np.roll(side, 1, axis=0)
+    previous_side = np.roll(side, 1, axis=0)
     if not front.is_closed:
-        back, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
+        previous_side, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
     first, _ = front.members()
-    ahead = front.stop[first] - front.start[first]
-    hollow = np.einsum("ij,ij->i", side - back, ahead) > 0
-    ahead_length, back_length = np.linalg.norm(side, axis=1), np.linalg.norm(back, axis=1)
-    turn = np.einsum("ij,ij->i", side, back) / (ahead_length * back_length)
-    for i in np.nonzero(hollow & (turn < _NOTCH) & ~front.is_pinned)[0][::-1]:
+    advance = front.stop[first] - front.start[first]
+    is_hollow = np.einsum("ij,ij->i", side - previous_side, advance) > 0
+    ahead_length, back_length = np.linalg.norm(side, axis=1), np.linalg.norm(previous_side, axis=1)
+    turn = np.einsum("ij,ij->i", side, previous_side) / (ahead_length * back_length)
+    for i in np.nonzero(is_hollow & (turn < _NOTCH) & ~front.is_pinned)[0][::-1]:
         if len(front.x) > 3:
-            into = i if ahead_length[i] < back_length[i] else (i - 1) % n
-            goal = (i + 1) % n if into == i else into
-            return merge_side(front, int(into), front.x[goal])
+            target = i if ahead_length[i] < back_length[i] else (i - 1) % n
+            goal = (i + 1) % n if target == i else target
+            return merge_side(front, int(target), front.x[goal])
     return front
 
 
@@ -273,17 +277,17 @@ _FLAT = 1e-7  # double area over the square of the longest side of a triangle wi
 _LIKE = 0.95  # a diagonal is as good as another if its worst triangle is at most that much worse
 
 
-def division_points(x: Floats, closed: bool, pieces: Ints, straight: Bools) -> list[Floats]:
+def division_points(x: Floats, is_closed: bool, pieces: Ints, is_straight: Bools) -> list[Floats]:
     """Points inside each side of a polyline, which divide it evenly.
 
     Parameters
     ----------
     x : (m, 3) array, length
-    closed : bool
+    is_closed : bool
         Whether a last side leads back to the first point.
     pieces : (sides,) array of int
         Into how many parts each side is divided.
-    straight : (m,) array of bool
+    is_straight : (m,) array of bool
         Points whose sides are to be divided as they are.
 
     Returns
@@ -292,16 +296,16 @@ def division_points(x: Floats, closed: bool, pieces: Ints, straight: Bools) -> l
         On the cubic with the tangents of the circles through three points in a row; on the
         straight side where one of its ends is a corner.
     """
-    side = steps(x, closed)
+    side = steps(x, is_closed)
     length = np.linalg.norm(side, axis=1)
-    tangent = tangents(x, closed)
+    tangent = tangents(x, is_closed)
     unit = side / length[:, None]
     result = []
     for j, count in enumerate(pieces):
         t = (np.arange(1, count) / count)[:, None]
         a, b = j, (j + 1) % len(x)
         inner = x[a] + t * side[j]
-        bends = count > 1 and not (straight[a] or straight[b])
+        bends = count > 1 and not (is_straight[a] or is_straight[b])
         if bends and min(tangent[a] @ unit[j], tangent[b] @ unit[j]) > np.sqrt((1 + _BEND) / 2):
             # Written as chord and bulge: a straight side stays straight to the last bit.
             first, last = length[j] * tangent[a] - side[j], length[j] * tangent[b] - side[j]
@@ -330,13 +334,13 @@ def stitch_side(
     -------
     triangles : list of (int, int, int)
         Without those that have a point twice.
-    upright : float
+    best_cosine : float
         Smallest cosine between the normal of a triangle and the given one; -1 for one without
         area.
     """
     place = [corners[0], corners[1], *numbers]
     best: list[tuple[int, int, int]] = []
-    quality, upright = -np.inf, -1.0
+    quality, best_cosine = -np.inf, -1.0
     for turn in range(len(numbers)):
         local = [(0, q + 3, q + 2) for q in range(turn)]
         local.append((0, 1, turn + 2))
@@ -352,8 +356,8 @@ def stitch_side(
         # The first way unless another is clearly better: neighbours are cut alike.
         if shape > (quality / _LIKE if quality > 0 else quality):
             best = [(place[a], place[b], place[c]) for a, b, c in local]
-            quality, upright = shape, cosine
-    return best, upright
+            quality, best_cosine = shape, cosine
+    return best, best_cosine
 
 
 def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, float]:
@@ -364,12 +368,14 @@ def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, 
         np.maximum(((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1)),
         ((a - c) ** 2).sum(axis=1),
     )
-    along, total = area @ normal, np.linalg.norm(area, axis=1)
-    cosine = np.where(total > _FLAT * longest, along / np.where(total > 0, total, 1.0), -1.0)
-    return float((along / longest).min()), float(cosine.min())
+    projected_area, total = area @ normal, np.linalg.norm(area, axis=1)
+    cosine = np.where(
+        total > _FLAT * longest, projected_area / np.where(total > 0, total, 1.0), -1.0
+    )
+    return float((projected_area / longest).min()), float(cosine.min())
 
 
-def along_front(s: Floats, values: Floats, place: Floats, closed: bool, length: float) -> Floats:
+def along_front(s: Floats, values: Floats, place: Floats, is_closed: bool, length: float) -> Floats:
     """Values at other places of a front, by monotone cubics (Fritsch and Butland, 1984).
 
     Parameters
@@ -379,7 +385,7 @@ def along_front(s: Floats, values: Floats, place: Floats, closed: bool, length: 
     values : (f,) array
     place : (k,) array, length
         Where they are sought.
-    closed : bool
+    is_closed : bool
         Whether the front is closed; else values beyond the first and last place are theirs.
     length : float, length
         Length of the front, the period of a closed one.
@@ -390,13 +396,13 @@ def along_front(s: Floats, values: Floats, place: Floats, closed: bool, length: 
     """
     from scipy.interpolate import PchipInterpolator
 
-    if closed:
+    if is_closed:
         s, place = s % length, place % length
     s, inverse = np.unique(s, return_inverse=True)
     values = np.bincount(inverse, weights=values) / np.bincount(inverse)
     if len(s) == 1:
         return np.full(len(place), values[0])
-    if closed:
+    if is_closed:
         n = min(3, len(s))
         s = np.concatenate([s[-n:] - length, s, s[:n] + length])
         values = np.concatenate([values[-n:], values, values[:n]])

@@ -124,9 +124,9 @@ class FrontCurve:
         FootPoints
             Unique where the metric is positive, that is nearer than the radius of curvature.
         """
-        return self.near(x, np.inf)[1]
+        return self.points_near(x, np.inf)[1]
 
-    def near(self, x: Floats, radius: float) -> tuple[Ints, FootPoints]:
+    def points_near(self, x: Floats, radius: float) -> tuple[Ints, FootPoints]:
         """Points within a radius of the front, and a few more, with their feet.
 
         Parameters
@@ -168,26 +168,28 @@ class FrontCurve:
         # Read-only as everywhere: a kernel is compiled once more for arrays that are not.
         return np.asarray(nearest_vertices(lock(x.view()), self._guesses[1], bound)[1])
 
-    def bend(self, s: Floats, over: float) -> Floats:
+    def bend(self, s: Floats, length_of_mean: float) -> Floats:
         """Radius of curvature, averaged over a length: a much shorter bend counts for little.
 
         Parameters
         ----------
         s : (q,) array, length
-        over : float, length
+        length_of_mean : float, length
 
         Returns
         -------
         (q,) array, length
             inf where a front is straight.
         """
-        low, high = np.asarray(s) - over / 2, np.asarray(s) + over / 2
+        low, high = np.asarray(s) - length_of_mean / 2, np.asarray(s) + length_of_mean / 2
         if not self.closed:
             low, high = np.clip(low, 0.0, self.length), np.clip(high, 0.0, self.length)
-        ahead, behind = self.at(high)[1][:, 2], self.at(low)[1][:, 2]
-        angle = 2 * np.arcsin(np.minimum(np.linalg.norm(ahead - behind, axis=1) / 2, 1.0))
-        straight = angle * self.length <= _STRAIGHT * (high - low)
-        return np.where(straight, np.inf, (high - low) / np.where(straight, 1.0, angle))
+        tangent_ahead, tangent_behind = self.at(high)[1][:, 2], self.at(low)[1][:, 2]
+        angle = 2 * np.arcsin(
+            np.minimum(np.linalg.norm(tangent_ahead - tangent_behind, axis=1) / 2, 1.0)
+        )
+        is_straight = angle * self.length <= _STRAIGHT * (high - low)
+        return np.where(is_straight, np.inf, (high - low) / np.where(is_straight, 1.0, angle))
 
     def arc(self, s: Floats) -> Floats:
         """Arc length from the first vertex `(q,)` at parameters within the breaks."""
@@ -199,7 +201,7 @@ class FrontCurve:
         return np.asarray(begin + (u - begin) * (speed @ _GAUSS[1]) / 2)
 
 
-def front_curve(x: Floats, frame: Floats, closed: bool) -> FrontCurve:
+def front_curve(x: Floats, frame: Floats, is_closed: bool) -> FrontCurve:
     """Smooth curve through the vertices of a front.
 
     Parameters
@@ -208,7 +210,7 @@ def front_curve(x: Floats, frame: Floats, closed: bool) -> FrontCurve:
         Vertices in the direction of b; the last of a closed front may repeat the first.
     frame : (m, 3, 3) array
         Rows (t, n, b); only the normals n count, t and b follow from the curve.
-    closed : bool
+    is_closed : bool
 
     Returns
     -------
@@ -230,11 +232,11 @@ def front_curve(x: Floats, frame: Floats, closed: bool) -> FrontCurve:
     """
     x, normal = np.asarray(x, dtype=float), np.asarray(frame, dtype=float)[:, 1]
     b = np.asarray(frame, dtype=float)[:, 2]
-    if closed and len(x) > 1 and np.allclose(x[0], x[-1], atol=1e-12 * np.ptp(x)):
+    if is_closed and len(x) > 1 and np.allclose(x[0], x[-1], atol=1e-12 * np.ptp(x)):
         x, normal, b = x[:-1], normal[:-1], b[:-1]
-    if len(x) < (3 if closed else 2):
+    if len(x) < (3 if is_closed else 2):
         raise GeometryError(f"a crack front needs more than {len(x)} points.")
-    if closed:
+    if is_closed:
         x, normal, b = (np.concatenate([v, v[:1]]) for v in (x, normal, b))
     chord = np.linalg.norm(np.diff(x, axis=0), axis=1)
     if chord.min() <= 1e-9 * chord.sum():
@@ -242,18 +244,21 @@ def front_curve(x: Floats, frame: Floats, closed: bool) -> FrontCurve:
         raise GeometryError(f"two vertices of a crack front coincide at {where}: leave one out.")
     if np.einsum("md,md->", np.diff(x, axis=0), b[1:] + b[:-1]) < 0:
         raise GeometryError("the vertices of a crack front run against b = t × n: reverse them.")
-    ends = "periodic" if closed else "not-a-knot"
-    breaks = np.concatenate([[0.0], np.cumsum(chord)])
+    ends = "periodic" if is_closed else "not-a-knot"
+    break_arcs = np.concatenate([[0.0], np.cumsum(chord)])
     for _ in range(4):
-        place = CubicSpline(breaks, x, bc_type=ends)
-        step = np.diff(breaks)
-        t = breaks[:-1, None] + step[:, None] * (_GAUSS[0] + 1) / 2
+        place = CubicSpline(break_arcs, x, bc_type=ends)
+        step = np.diff(break_arcs)
+        t = break_arcs[:-1, None] + step[:, None] * (_GAUSS[0] + 1) / 2
         speed = np.linalg.norm(place(t, 1), axis=2)
-        breaks = np.concatenate([[0.0], np.cumsum(step * (speed @ _GAUSS[1]) / 2)])
-    place, across = CubicSpline(breaks, x, bc_type=ends), CubicSpline(breaks, normal, bc_type=ends)
+        break_arcs = np.concatenate([[0.0], np.cumsum(step * (speed @ _GAUSS[1]) / 2)])
+    place, normal_spline = (
+        CubicSpline(break_arcs, x, bc_type=ends),
+        CubicSpline(break_arcs, normal, bc_type=ends),
+    )
     return FrontCurve(
-        lock(breaks),
+        lock(break_arcs),
         lock(np.ascontiguousarray(place.c)),
-        lock(np.ascontiguousarray(across.c)),
-        closed,
+        lock(np.ascontiguousarray(normal_spline.c)),
+        is_closed,
     )

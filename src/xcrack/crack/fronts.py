@@ -15,19 +15,19 @@ _FAR = 2.5  # median spacings that still close a front, from its last point to i
 # Sides and tangents of polylines in 3D, open or closed.
 
 
-def steps(x: Floats, closed: bool) -> Floats:
+def steps(x: Floats, is_closed: bool) -> Floats:
     """Vectors from each point of a polyline to the next one."""
-    return np.asarray(np.roll(x, -1, axis=0) - x if closed else np.diff(x, axis=0))
+    return np.asarray(np.roll(x, -1, axis=0) - x if is_closed else np.diff(x, axis=0))
 
 
-def tangents(x: Floats, closed: bool) -> Floats:
+def tangents(x: Floats, is_closed: bool) -> Floats:
     """Unit tangents of the circles through three points in a row, of the sides at open ends."""
-    side = steps(x, closed)
-    ahead = side if closed else np.concatenate([side, side[-1:]])
-    back = np.roll(side, 1, axis=0) if closed else np.concatenate([side[:1], side])
-    ahead_length = np.linalg.norm(ahead, axis=1, keepdims=True)
-    back_length = np.linalg.norm(back, axis=1, keepdims=True)
-    tangent = ahead / ahead_length * back_length + back / back_length * ahead_length
+    side = steps(x, is_closed)
+    next_side = side if is_closed else np.concatenate([side, side[-1:]])
+    previous_side = np.roll(side, 1, axis=0) if is_closed else np.concatenate([side[:1], side])
+    ahead_length = np.linalg.norm(next_side, axis=1, keepdims=True)
+    back_length = np.linalg.norm(previous_side, axis=1, keepdims=True)
+    tangent = next_side / ahead_length * back_length + previous_side / back_length * ahead_length
     length = np.linalg.norm(tangent, axis=1, keepdims=True)
     return np.asarray(tangent / np.where(length > 0, length, 1.0))
 
@@ -78,16 +78,16 @@ def front_frames(crack: Crack) -> list[Front]:
     normal = corner_normals(crack.points, crack.faces)
     result = []
     for front in crack.fronts or ():
-        closed = bool(front[0] == front[-1])
-        number = np.array(front[:-1] if closed else front)
+        is_closed = bool(front[0] == front[-1])
+        number = np.array(front[:-1] if is_closed else front)
         x = crack.points[number]
-        b = tangents(x, closed)
+        b = tangents(x, is_closed)
         n = normal[number]
         n = unit(n - np.einsum("ij,ij->i", n, b)[:, None] * b)
         frame = np.stack([np.cross(n, b), n, b], axis=1)
         length = np.linalg.norm(np.diff(x, axis=0), axis=1)
         s = np.concatenate([[0.0], np.cumsum(length)])
-        result.append(Front(lock(x), lock(frame), closed, lock(s), lock(number)))
+        result.append(Front(lock(x), lock(frame), is_closed, lock(s), lock(number)))
     return result
 
 
@@ -103,12 +103,12 @@ def front_weights(x: Floats) -> Floats:
     """Share of the length of a front that belongs to each of its points `(m,)`; their sum is 1."""
     if len(x) == 1:
         return np.ones(1)
-    along = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    side_length = np.linalg.norm(np.diff(x, axis=0), axis=1)
     if is_closed(x):
-        along = np.append(along, np.linalg.norm(x[0] - x[-1]))
-        weight = along + np.roll(along, 1)
+        side_length = np.append(side_length, np.linalg.norm(x[0] - x[-1]))
+        weight = side_length + np.roll(side_length, 1)
     else:
-        weight = np.append(along, 0.0) + np.append(0.0, along)
+        weight = np.append(side_length, 0.0) + np.append(0.0, side_length)
     total = float(weight.sum())
     return np.asarray(weight / total if total else np.full(len(x), 1 / len(x)))
 

@@ -57,12 +57,14 @@ class Junction:
     reach: float
 
 
-def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+def on_others(
+    given_cracks: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh
+) -> tuple[Crack, ...]:
     """Cracks whose ends on other cracks are no tips, moved onto them exactly.
 
     Parameters
     ----------
-    given : sequence of Crack
+    given_cracks : sequence of Crack
         Cracks whose tips are known there keep them.
     cracks : tuple of Crack
         The same ones, placed in the mesh.
@@ -72,33 +74,33 @@ def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> 
         return cracks
     result = list(cracks)
     for c, crack in enumerate(cracks):
-        for tip in (crack.tips or ()) if given[c].tips is None else ():
-            end, before = crack.points[tip], crack.points[1 if tip == 0 else tip - 1]
-            on = _ends_on(c, before, end, result, _size(mesh, end))
+        for tip in (crack.tips or ()) if given_cracks[c].tips is None else ():
+            end, previous_point = crack.points[tip], crack.points[1 if tip == 0 else tip - 1]
+            on = _ends_on(c, previous_point, end, result, _size(mesh, end))
             if on is None:
                 continue
             points = np.array(result[c].points)
-            points[tip] = _on_line(before, end, result[on].points)
+            points[tip] = _on_line(previous_point, end, result[on].points)
             tips = tuple(t for t in result[c].tips or () if t != tip)
             result[c] = Crack(points, crack.faces, tips)
     return tuple(result)
 
 
 def _ends_on(
-    c: int, before: Floats, end: Floats, cracks: Sequence[Crack], size: float
+    c: int, previous_point: Floats, end: Floats, cracks: Sequence[Crack], size: float
 ) -> int | None:
     """The crack that is meant where crack c ends close to others; None where it has a tip.
 
     Cracks that it lies along do not count: the arm on the other side of an X is one, and placing
     refuses those that overlap it. Of others those count first that do not end there too.
     """
-    ahead = (end - before) / np.linalg.norm(end - before)
+    direction = (end - previous_point) / np.linalg.norm(end - previous_point)
     best, chosen = (True, np.inf), None
     for other, crack in enumerate(cracks):
         if other == c:
             continue
         foot, distance = _nearest_point(end, crack.points)
-        if distance > _ON * size or _sine(ahead, _arms(foot, crack.points, size)) < 1e-3:
+        if distance > _ON * size or _sine(direction, _arms(foot, crack.points, size)) < 1e-3:
             continue
         to_ends = np.linalg.norm(crack.points[[0, -1]] - foot, axis=1)
         rank = bool(to_ends.min() < _APART * size), distance
@@ -115,12 +117,12 @@ def _nearest_point(x: Floats, line: Floats) -> tuple[Floats, float]:
     return foot[k], float(distance[k])
 
 
-def _on_line(before: Floats, end: Floats, line: Floats) -> Floats:
+def _on_line(previous_point: Floats, end: Floats, line: Floats) -> Floats:
     """Where the last piece of a crack, prolonged, meets the polyline that it ends close to."""
     foot, distance = _nearest_point(end, line)
     if distance == 0:
         return end
-    hits = crossing_points(np.stack([before, end + (end - before)]), line)
+    hits = crossing_points(np.stack([previous_point, end + (end - previous_point)]), line)
     from_end = np.linalg.norm(hits - end, axis=1)
     # A crack that comes in at a small angle meets the other one far from the foot of its end.
     if len(hits) and from_end.min() <= distance / _SINE:
@@ -147,9 +149,9 @@ def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
         ends = [end for end in (0, last) if end not in (crack.tips or ())]
         if not ends:
             continue
-        for end, inside in zip(ends, contains(mesh, crack.points[ends]).tolist()):
+        for end, is_inside in zip(ends, contains(mesh, crack.points[ends]).tolist()):
             # The last step of a run has cracks that end on the boundary itself.
-            if inside and not _on_boundary(crack.points[end], mesh):
+            if is_inside and not _on_boundary(crack.points[end], mesh):
                 result.append(_junction(c, end, cracks, mesh))
     _check_apart(result, cracks, mesh)
     return tuple(result)
@@ -163,11 +165,11 @@ def _on_boundary(x: Floats, mesh: Mesh) -> bool:
 def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Junction:
     x, h = cracks[c].points[end], _size(mesh, cracks[c].points[end])
     on = _crack_at(c, x, cracks, h)
-    before = cracks[c].points[1 if end == 0 else end - 1]
-    length = float(np.linalg.norm(x - before))
-    ahead = (x - before) / length
+    previous_point = cracks[c].points[1 if end == 0 else end - 1]
+    length = float(np.linalg.norm(x - previous_point))
+    direction = (x - previous_point) / length
     line = cracks[on].points
-    sine = _sine(ahead, _arms(x, line, h))
+    sine = _sine(direction, _arms(x, line, h))
     if sine < _SINE:
         raise GeometryError(
             f"crack {c} ends on crack {on} at {at(x)} at an angle of "
@@ -175,7 +177,7 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
             "they are not told apart. Of three arms give the two that are nearly in line as one "
             "crack, and let the third end on it."
         )
-    step = min(0.1 * h * sine, 0.5 * length) * ahead
+    step = min(0.1 * h * sine, 0.5 * length) * direction
     side = _side(x - step, line)
     if _side(x + step, line) == side:
         raise GeometryError(
@@ -187,15 +189,15 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
     tips = [p for k in (c, on) for p in tip_frames(cracks[k])[0]]
     to_tip = min((float(np.linalg.norm(p - x)) for p in tips), default=np.inf)
     way = min(_BEYOND * h / sine, max(to_tip - _BEFORE_TIP * h, _BEYOND * h))
-    again = crossing_points(np.stack([x + 1e-3 * h * ahead, x + 2 * way * ahead]), line)
-    free = float(np.linalg.norm(again - x, axis=1).min(initial=np.inf)) / 2
-    if free < _LEAST * h:
+    crossings = crossing_points(np.stack([x + 1e-3 * h * direction, x + 2 * way * direction]), line)
+    free_length = float(np.linalg.norm(crossings - x, axis=1).min(initial=np.inf)) / 2
+    if free_length < _LEAST * h:
         raise CoarseMeshError(
             f"crack {on}, on which crack {c} ends at {at(x)}, turns back to it within "
-            f"{2 * free:.4g}, two cells ({h:.4g}) or less: refine the mesh there."
+            f"{2 * free_length:.4g}, two cells ({h:.4g}) or less: refine the mesh there."
         )
     reach = max(REACH, 2 / sine + 2) * h
-    return Junction(c, end, on, x, side, x + min(way, free) * ahead, reach)
+    return Junction(c, end, on, x, side, x + min(way, free_length) * direction, reach)
 
 
 def _crack_at(c: int, x: Floats, cracks: tuple[Crack, ...], h: float) -> int:
@@ -224,12 +226,12 @@ def _arms(x: Floats, line: Floats, h: float) -> Floats:
     """Directions of the pieces of a polyline at one of its points."""
     foot = closest_on_segment(x, line[:-1], line[1:])
     pieces = np.linalg.norm(foot - x, axis=1) <= _SAME * h
-    along = np.diff(line, axis=0)[pieces]
-    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+    pieces_at_point = np.diff(line, axis=0)[pieces]
+    return np.asarray(pieces_at_point / np.linalg.norm(pieces_at_point, axis=1, keepdims=True))
 
 
-def _sine(ahead: Floats, arms: Floats) -> float:
-    return float(np.abs(ahead[0] * arms[:, 1] - ahead[1] * arms[:, 0]).min())
+def _sine(direction: Floats, arms: Floats) -> float:
+    return float(np.abs(direction[0] * arms[:, 1] - direction[1] * arms[:, 0]).min())
 
 
 def _side(x: Floats, line: Floats) -> int:
@@ -242,26 +244,26 @@ def _side(x: Floats, line: Floats) -> int:
 def _check_apart(result: list[Junction], cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     """Raise where a junction is closer than a cell to a tip, an end or a junction beside it."""
     for i, junction in enumerate(result):
-        least = _APART * _size(mesh, junction.x)
+        least_distance = _APART * _size(mesh, junction.x)
         for c, crack in enumerate(cracks):
             for tip in crack.tips or ():
                 distance = float(np.linalg.norm(crack.points[tip] - junction.x))
-                if distance < least:
+                if distance < least_distance:
                     raise CoarseMeshError(
                         f"crack {junction.crack} ends on crack {junction.on} at {at(junction.x)}, "
                         f"{distance:.4g} from a tip of crack {c} at {at(crack.points[tip])} and "
-                        f"closer than a cell ({least:.4g}): move it away from the tip, refine the "
-                        f"mesh there, or let both cracks be one that runs through."
+                        f"closer than a cell ({least_distance:.4g}): move it away from the tip, "
+                        f"refine the mesh there, or let both cracks be one that runs through."
                     )
         for other in result[:i]:
             distance = float(np.linalg.norm(other.x - junction.x))
-            opposite = other.on == junction.on and other.side != junction.side
-            if distance < least and not opposite:
+            is_opposite = other.on == junction.on and other.side != junction.side
+            if distance < least_distance and not is_opposite:
                 raise GeometryError(
                     f"cracks {other.crack} and {junction.crack} end {distance:.4g} from each other "
-                    f"at {at(junction.x)}, closer than a cell ({least:.4g}) and from the same "
-                    f"side: let them end on each other's continuation, a cell or more apart, or on "
-                    f"opposite sides of one crack."
+                    f"at {at(junction.x)}, closer than a cell ({least_distance:.4g}) and from the "
+                    f"same side: let them end on each other's continuation, a cell or more apart, "
+                    f"or on opposite sides of one crack."
                 )
 
 

@@ -102,9 +102,9 @@ class BodyBefore(Body):
         """Distance to the boundary or to such a crack, negative inside, and the size there."""
         depth, size = super().depth(x)
         for tree, side in self.crack_trees:
-            beyond = -side * signed_in(tree, x)[0]
-            first = beyond > depth
-            depth = np.where(first, beyond, depth)
+            is_beyond = -side * signed_in(tree, x)[0]
+            first = is_beyond > depth
+            depth = np.where(first, is_beyond, depth)
             size = np.where(first, self.cell_size(x), size)
         return depth, size
 
@@ -113,10 +113,10 @@ def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
     """The body for one of some cracks: without what lies beyond others on which it ends."""
     if not cracks[c].ends_on:
         return body
-    under = tuple(
+    cracks_under = tuple(
         (triangle_tree(cracks[on].points, cracks[on].faces), side) for on, side in cracks[c].ends_on
     )
-    return BodyBefore(body.mesh, body.boundary, body.facet_size, under)
+    return BodyBefore(body.mesh, body.boundary, body.facet_size, cracks_under)
 
 
 def _signed_distance(crack: Crack, x: Floats) -> Floats:
@@ -137,8 +137,8 @@ def are_opposite(one: Crack, other: Crack) -> bool:
     return any((on, -side) in other.ends_on for on, side in one.ends_on)
 
 
-def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, agrees: bool) -> list[Crack]:
-    """Cracks without number k, which has become part of i; `agrees` where both look one way.
+def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, is_aligned: bool) -> list[Crack]:
+    """Cracks without number k, which has become part of i; `is_aligned` where both look one way.
 
     Raises
     ------
@@ -153,9 +153,9 @@ def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, agrees: bool) -> li
         number -= number > k
         ends = list(result[number].ends_on)
         for on, side in crack.ends_on:
-            turned = -side if on == k and not agrees else side
-            end = ((i if on == k else on) - ((i if on == k else on) > k), turned)
-            if end[0] == number or (end[0], -turned) in ends:
+            new_side = -side if on == k and not is_aligned else side
+            end = ((i if on == k else on) - ((i if on == k else on) > k), new_side)
+            if end[0] == number or (end[0], -new_side) in ends:
                 raise GeometryError(
                     f"cracks {i} and {k} become one, which would end on itself or on both sides of "
                     "another one: end growth before, and give what has become of them."
@@ -165,17 +165,17 @@ def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, agrees: bool) -> li
     return result
 
 
-def check_numbers(given: Sequence[Crack]) -> None:
+def check_numbers(cracks: Sequence[Crack]) -> None:
     """Raise where arms end on what is not there, on themselves, or in a circle."""
-    for c, crack in enumerate(given):
-        beneath, number = [c], c
-        reached = {c}
-        while beneath:
-            number = beneath.pop()
-            for on, _ in given[number].ends_on:
-                if on >= len(given):
+    for c, crack in enumerate(cracks):
+        numbers_below, number = [c], c
+        reached_cracks = {c}
+        while numbers_below:
+            number = numbers_below.pop()
+            for on, _ in cracks[number].ends_on:
+                if on >= len(cracks):
                     raise GeometryError(
-                        f"crack {number} ends on crack {on}, but there are {len(given)}, numbered "
+                        f"crack {number} ends on crack {on}, but there are {len(cracks)}, numbered "
                         "from 0 on: give the number of one of them."
                     )
                 if on == c:
@@ -183,9 +183,9 @@ def check_numbers(given: Sequence[Crack]) -> None:
                         f"crack {c} ends on itself, or on one that ends on it: of cracks that meet "
                         "let one run through."
                     )
-                if on not in reached:
-                    reached.add(on)
-                    beneath.append(on)
+                if on not in reached_cracks:
+                    reached_cracks.add(on)
+                    numbers_below.append(on)
         if len({on for on, _ in crack.ends_on}) < len(crack.ends_on):
             raise GeometryError(
                 f"crack {c} ends on one crack twice: give an arm for each side of it."
@@ -201,8 +201,8 @@ def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, 
             if not len(line):
                 d = np.abs(_signed_distance(cracks[on], crack.points))
                 line = crack.points[[int(np.argmin(d))]]
-            inside = Body.of(mesh).contains(line)
-            line = line[inside] if inside.any() else line
+            is_inside = Body.of(mesh).contains(line)
+            line = line[is_inside] if is_inside.any() else line
             middle = line[int(np.argmin(np.linalg.norm(line - line.mean(axis=0), axis=1)))]
             result.append(Junction(c, -1, on, middle, side, middle, np.inf))
     return tuple(result)
@@ -261,24 +261,24 @@ def _ways_to_face(
     cracks: Sequence[Crack], c: int, on: int, body: Body, reach: float
 ) -> list[tuple[Front, Floats, Floats]]:
     """Fronts of crack c near another one: ways `(m,)` straight ahead to its face, legs of cells."""
-    farthest = reach * _LEG * float(body.mesh.cell_size.max())
-    low = cracks[on].points.min(axis=0) - farthest
-    high = cracks[on].points.max(axis=0) + farthest
+    largest_reach = reach * _LEG * float(body.mesh.cell_size.max())
+    low = cracks[on].points.min(axis=0) - largest_reach
+    high = cracks[on].points.max(axis=0) + largest_reach
     result = []
     tree: TriangleTree | None = None
-    before = body
+    body_before = body
     for front in front_frames(cracks[c]):
         rows = np.nonzero(((front.x >= low) & (front.x <= high)).all(axis=1))[0]
         if not len(rows):
             continue
         if tree is None:
             tree = triangle_tree(cracks[on].points, cracks[on].faces)
-            before = body_of(cracks, c, body)
+            body_before = body_of(cracks, c, body)
         leg = _LEG * body.cell_size(front.x)
-        start, ahead = front.x[rows], (reach * leg[:, None] * front.frame[:, 0])[rows]
-        triangle, share = first_crossing(tree, start, start + ahead)
-        is_met = (triangle >= 0) & before.contains(start)
-        is_met &= before.contains(start + np.where(is_met, share, 0.0)[:, None] * ahead)
+        start, advance = front.x[rows], (reach * leg[:, None] * front.frame[:, 0])[rows]
+        triangle, share = first_crossing(tree, start, start + advance)
+        is_met = (triangle >= 0) & body_before.contains(start)
+        is_met &= body_before.contains(start + np.where(is_met, share, 0.0)[:, None] * advance)
         way = np.full(len(front.x), np.inf)
         way[rows[is_met]] = (share * reach * leg[rows])[is_met]
         result.append((front, way, leg))
@@ -307,7 +307,7 @@ def led_through(
         Not placed again.
     """
     tree = triangle_tree(cracks[on].points, cracks[on].faces)
-    near = {
+    nearby_fronts = {
         int(front.number[0]): (way, leg)
         for front, way, leg in _ways_to_face(cracks, c, on, body, reach)
     }
@@ -316,19 +316,19 @@ def led_through(
         s.append(front.s)
         number.append(np.full(len(front.x), f))
         da.append(np.zeros(len(front.x)))
-        if int(front.number[0]) in near:
-            way, leg = near[int(front.number[0])]
+        if int(front.number[0]) in nearby_fronts:
+            way, leg = nearby_fronts[int(front.number[0])]
             is_led = np.isfinite(way)
             da[-1][is_led] = (way + _LED / _LEG * leg)[is_led]
             depth.append(signed_in(tree, front.x[is_led])[0])
             cell.append(leg[is_led] / _LEG)
     side = 1 if np.concatenate(depth).mean() > 0 else -1
     ways = np.concatenate(da)
-    grown = advance_fronts(
+    grown_crack = advance_fronts(
         cracks[c], np.concatenate(s), np.concatenate(number), 0 * ways, ways,
         size * float(np.concatenate(cell).mean()),
     )  # fmt: skip
-    return replace(grown, ends_on=(*cracks[c].ends_on, (on, side)))
+    return replace(grown_crack, ends_on=(*cracks[c].ends_on, (on, side)))
 
 
 def with_room(
@@ -365,13 +365,13 @@ def with_room(
     s, number, da, cells = [], [], [], []
     for f, front in enumerate(fronts):
         cell = body.cell_size(front.x)
-        ahead, height, along = np.moveaxis(
+        advance, height, distance_along = np.moveaxis(
             np.einsum("mij,mkj->mki", front.frame, x[None] - front.x[:, None]), 2, 0
         )
         least_room = room * cell[:, None]
         # A parabola twice as wide as it is high: the front that is led on stays smooth.
-        lead = ahead + least_room - along**2 / (4 * least_room)
-        lead[(np.abs(height) > least_room) | (np.abs(along) > 2 * least_room)] = 0.0
+        lead = advance + least_room - distance_along**2 / (4 * least_room)
+        lead[(np.abs(height) > least_room) | (np.abs(distance_along) > 2 * least_room)] = 0.0
         is_inside = body.contains(front.x)
         s.append(front.s)
         number.append(np.full(len(front.x), f))
@@ -381,10 +381,10 @@ def with_room(
     if not ways.any():
         return cracks[on]
     spacing = size * float(np.concatenate(cells)[ways > 0].mean())
-    grown = advance_fronts(
+    grown_crack = advance_fronts(
         cracks[on], np.concatenate(s), np.concatenate(number), 0 * ways, ways, spacing
     )
-    return replace(grown, ends_on=cracks[on].ends_on)
+    return replace(grown_crack, ends_on=cracks[on].ends_on)
 
 
 def face_led_on(
@@ -417,14 +417,14 @@ def face_led_on(
     if not is_inside.any():
         return None
     cell = body.cell_size(y)
-    away = np.where(is_inside, cKDTree(x).query(y)[0], np.inf)
-    beside = (away - away.min()) / (_BESIDE * cell)
-    ways = way * cell * np.maximum(1 - beside**2, 0.0)
+    distance = np.where(is_inside, cKDTree(x).query(y)[0], np.inf)
+    relative_distance = (distance - distance.min()) / (_BESIDE * cell)
+    ways = way * cell * np.maximum(1 - relative_distance**2, 0.0)
     spacing = size * float(cell[ways > 0].mean())
     s = np.concatenate([front.s for front in fronts])
     number = np.repeat(np.arange(len(fronts)), [len(front.x) for front in fronts])
-    grown = advance_fronts(cracks[on], s, number, 0 * ways, ways, spacing)
-    return replace(grown, ends_on=cracks[on].ends_on)
+    grown_crack = advance_fronts(cracks[on], s, number, 0 * ways, ways, spacing)
+    return replace(grown_crack, ends_on=cracks[on].ends_on)
 
 
 def _front_points(cracks: Sequence[Crack], c: int, body: Body) -> Floats:

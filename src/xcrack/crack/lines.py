@@ -55,12 +55,13 @@ def line_crack(points: Annotated[ArrayLike, Points((None, 2))]) -> Crack:
             f"the crack has a piece of zero length: points {i} and {i + 1} both lie at "
             f"{x[i].tolist()}; leave one out."
         )
-    along = np.diff(x, axis=0) / length[:, None]
-    turns = (along[1:] * along[:-1]).sum(axis=1)
+    directions = np.diff(x, axis=0) / length[:, None]
+    turns = (directions[1:] * directions[:-1]).sum(axis=1)
     if (turns < -1 + 1e-12).any():
-        back = x[1 + int(np.argmin(turns))]
+        turning_point = x[1 + int(np.argmin(turns))]
         raise GeometryError(
-            f"the crack turns back on itself at {at(back)}: leave out what runs over it twice."
+            f"the crack turns back on itself at {at(turning_point)}: leave out "
+            "what runs over it twice."
         )
     if np.linalg.norm(x[-1] - x[0]) <= _SAME * length.sum():
         raise GeometryError(

@@ -133,11 +133,11 @@ def _area_inside(crack: Crack, body: Body) -> float:
         total += float(area[~is_near & (depth < 0)].sum())
         side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
         cell = body.cell_size(centre)
-        small = is_near & (side.max(axis=1) <= _FINE * cell)
-        corners = piece[small].reshape(-1, 3)
+        is_small = is_near & (side.max(axis=1) <= _FINE * cell)
+        corners = piece[is_small].reshape(-1, 3)
         share = _share_below_zero(body.depth(corners)[0].reshape(-1, 3))
-        total += float((area[small] * share).sum())
-        piece = halved_triangles(piece[is_near & ~small], side[is_near & ~small])
+        total += float((area[is_small] * share).sum())
+        piece = halved_triangles(piece[is_near & ~is_small], side[is_near & ~is_small])
     if total <= 0:
         raise ProblemError(f"no part of the crack at {crack.points[0].tolist()} is in the body.")
     return total
@@ -161,13 +161,13 @@ def front_length_inside(crack: Crack, mesh: Mesh) -> float:
 
 
 def _front_length_inside(crack: Crack, body: Body) -> float:
-    finest = _FINE * float(body.mesh.cell_size.min())
+    finest_size = _FINE * float(body.mesh.cell_size.min())
     total = 0.0
     for front in crack.fronts or ():
         x = crack.points[front]
         side = np.diff(x, axis=0)
         length = np.linalg.norm(side, axis=1)
-        parts = np.clip(np.ceil(length / finest), 1, _MOST).astype(np.int64)
+        parts = np.clip(np.ceil(length / finest_size), 1, _MOST).astype(np.int64)
         row, part = ranges(parts)
         one, other = (
             body.depth(x[row] + ((part + end) / parts[row])[:, None] * side[row])[0]
@@ -247,13 +247,13 @@ def halved_triangles(piece: Floats, side: Floats) -> Floats:
 
 def _share_below_zero(values: Floats) -> Floats:
     """Share of each triangle in which the linear function with these corner values is < 0."""
-    below = (values < 0).sum(axis=1)
-    ordered = np.sort(values, axis=1)
-    low, middle, high = ordered.T
+    n_below = (values < 0).sum(axis=1)
+    sorted_values = np.sort(values, axis=1)
+    low, middle, high = sorted_values.T
     spread = np.where(high > low, high - low, 1.0)
     one = low**2 / (np.where(middle > low, middle - low, 1.0) * spread)
     two = 1 - high**2 / (spread * np.where(high > middle, high - middle, 1.0))
-    return np.asarray(np.choose(below, [np.zeros_like(low), one, two, np.ones_like(low)]))
+    return np.asarray(np.choose(n_below, [np.zeros_like(low), one, two, np.ones_like(low)]))
 
 
 # Lines in which a surface meets the boundary of a body, and what lies how deep below them.
@@ -290,22 +290,23 @@ def measures_of_surface(
     segment = _trace(crack, body)
     facet = outer[signed_in(body.boundary, segment.mean(axis=1))[1]] if len(segment) else outer[:0]
     fronts = [_front_points(crack, front, body) for front in crack.fronts or ()]
-    deepest = np.concatenate([np.zeros((0, 3)), *fronts])
+    candidates = np.concatenate([np.zeros((0, 3)), *fronts])
     ends = [
         (x, int(outer[signed_in(body.boundary, x[None])[1][0]]), k)
         for k, x in front_ends(crack, body)
     ]
     # Traces and fronts end at the same places.
-    deepest = np.concatenate([deepest, *(x[None] for x, _, _ in ends)])
-    if not len(deepest):
-        deepest = segment.reshape(-1, 3)
+    candidates = np.concatenate([candidates, *(x[None] for x, _, _ in ends)])
+    if not len(candidates):
+        candidates = segment.reshape(-1, 3)
     of = group[facet]
     traces = {}
     for k in np.unique(of).tolist():
         segments_on_set = segment[of == k]
         length = float(np.linalg.norm(segments_on_set[:, 1] - segments_on_set[:, 0], axis=1).sum())
         depth = max(
-            (float(distance_to_simplices(x, segments_on_set).min()) for x in deepest), default=0.0
+            (float(distance_to_simplices(x, segments_on_set).min()) for x in candidates),
+            default=0.0,
         )
         traces[k] = (length, depth)
     return area_inside(crack, mesh), front_length_inside(crack, mesh), traces, ends
@@ -342,9 +343,9 @@ def _trace(crack: Crack, body: Body) -> Floats:
         is_near = np.abs(depth) < radius
         piece, size = piece[is_near], size[is_near]
         side = np.linalg.norm(np.roll(piece, -1, axis=1) - piece, axis=2)
-        small = side.max(axis=1) <= _FINE_SURFACE * size
-        parts.append(_zero_lines(piece[small], body))
-        piece = halved_triangles(piece[~small], side[~small])
+        is_small = side.max(axis=1) <= _FINE_SURFACE * size
+        parts.append(_zero_lines(piece[is_small], body))
+        piece = halved_triangles(piece[~is_small], side[~is_small])
     return np.concatenate(parts)
 
 
@@ -353,13 +354,18 @@ def _zero_lines(piece: Floats, body: Body) -> Floats:
     if not len(piece):
         return np.zeros((0, 2, 3))
     depth = body.depth(piece.reshape(-1, 3))[0].reshape(-1, 3)
-    outside: Bools = depth >= 0
-    count = outside.sum(axis=1)
-    crossed = (count == 1) | (count == 2)
-    piece, depth, outside, count = piece[crossed], depth[crossed], outside[crossed], count[crossed]
+    is_outside: Bools = depth >= 0
+    count = is_outside.sum(axis=1)
+    is_crossed = (count == 1) | (count == 2)
+    piece, depth, is_outside, count = (
+        piece[is_crossed],
+        depth[is_crossed],
+        is_outside[is_crossed],
+        count[is_crossed],
+    )
     # The corner alone on its side first, the two others after it.
-    alone = np.argmax(outside == (count == 1)[:, None], axis=1)
-    order = (alone[:, None] + np.arange(3)) % 3
+    lone_corner = np.argmax(is_outside == (count == 1)[:, None], axis=1)
+    order = (lone_corner[:, None] + np.arange(3)) % 3
     x = np.take_along_axis(piece, order[..., None], axis=1)
     d = np.take_along_axis(depth, order, axis=1)
     t = d[:, :1] / (d[:, :1] - d[:, 1:])
@@ -384,20 +390,22 @@ def _dense_points(x: Floats, body: Body) -> Floats:
 
 def _ends(x: Floats, body: Body) -> list[Floats]:
     """Where an open front meets the boundary, or would if its end were prolonged."""
-    closed = bool((x[0] == x[-1]).all())
+    is_closed = bool((x[0] == x[-1]).all())
     points = _dense_points(x, body)
-    inside = body.depth(points)[0] < 0
-    if not inside.any():
+    is_inside = body.depth(points)[0] < 0
+    if not is_inside.any():
         return []
-    change = np.nonzero(inside[1:] != inside[:-1])[0]
+    change = np.nonzero(is_inside[1:] != is_inside[:-1])[0]
     result = [_boundary_crossing(points[i], points[i + 1], body) for i in change]
-    if closed:
+    if is_closed:
         return result
-    for end, before in ((points[0], points[1]), (points[-1], points[-2])):
+    for end, previous_point in ((points[0], points[1]), (points[-1], points[-2])):
         if body.depth(end[None])[0][0] >= 0:
             continue
-        ahead = (end - before) / max(float(np.linalg.norm(end - before)), 1e-300)
-        prolonged_end = end + _REACH * body.cell_size(end[None])[0] * ahead
+        direction = (end - previous_point) / max(
+            float(np.linalg.norm(end - previous_point)), 1e-300
+        )
+        prolonged_end = end + _REACH * body.cell_size(end[None])[0] * direction
         if body.depth(prolonged_end[None])[0][0] >= 0:
             result.append(_boundary_crossing(end, prolonged_end, body))
     return result
@@ -405,10 +413,10 @@ def _ends(x: Floats, body: Body) -> list[Floats]:
 
 def _boundary_crossing(one: Floats, other: Floats, body: Body) -> Floats:
     """Place on the boundary between a point inside and one outside."""
-    inside = body.depth(one[None])[0][0] < 0
+    is_inside = body.depth(one[None])[0][0] < 0
     for _ in range(_BISECTIONS):
         middle = (one + other) / 2
-        if (body.depth(middle[None])[0][0] < 0) == inside:
+        if (body.depth(middle[None])[0][0] < 0) == is_inside:
             one = middle
         else:
             other = middle
@@ -568,21 +576,21 @@ def facet_names(mesh: Mesh) -> tuple[list[str], Ints]:
     return [name for name, _ in sets], group
 
 
-def exit_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
+def exit_ahead(x: Floats, direction: Floats, mesh: Mesh) -> tuple[Floats, str] | None:
     """Where a tip that runs straight meets the boundary, and the facet set there."""
     facet = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     start, stop = mesh.points[mesh.facets[facet]].transpose(1, 0, 2)
     side, gap = stop - start, start - x
-    cross = ahead[0] * side[:, 1] - ahead[1] * side[:, 0]
+    cross = direction[0] * side[:, 1] - direction[1] * side[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        far = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
-        share = (gap[:, 0] * ahead[1] - gap[:, 1] * ahead[0]) / cross
-    hit = (cross != 0) & (share >= 0) & (share <= 1) & (far > 0)
+        distance = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
+        share = (gap[:, 0] * direction[1] - gap[:, 1] * direction[0]) / cross
+    hit = (cross != 0) & (share >= 0) & (share <= 1) & (distance > 0)
     if not hit.any():
         return None
-    first = int(np.argmin(np.where(hit, far, np.inf)))
+    first = int(np.argmin(np.where(hit, distance, np.inf)))
     names, group = facet_names(mesh)
-    return x + far[first] * ahead, names[group[facet[first]]]
+    return x + distance[first] * direction, names[group[facet[first]]]
 
 
 __all__ = [

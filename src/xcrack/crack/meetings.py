@@ -55,13 +55,13 @@ def last_faces(cracks: Sequence[Crack]) -> Faces:
     return Faces(*map(np.concatenate, parts))
 
 
-def moved_on(faces: Faces, grown: Bools, size: Floats) -> Bools:
+def moved_on(faces: Faces, has_grown: Bools, size: Floats) -> Bools:
     """Whether the last point of each tip moves on with it: its face was added, and is short."""
-    return np.asarray(grown & (faces.length < _WHOLE * size))
+    return np.asarray(has_grown & (faces.length < _WHOLE * size))
 
 
 def with_tips_at(
-    cracks: Sequence[Crack], place: Floats, grown: Bools, size: Floats
+    cracks: Sequence[Crack], place: Floats, has_grown: Bools, size: Floats
 ) -> tuple[list[Crack], Bools]:
     """Cracks that go on to given places.
 
@@ -71,7 +71,7 @@ def with_tips_at(
         Placed.
     place : (n, 2) array, length
         Where the tips of all of them are to be.
-    grown : (n,) array of bool
+    has_grown : (n,) array of bool
         Whether the last face was added by growth.
     size : (n,) array, length
         Of the cells there.
@@ -85,13 +85,13 @@ def with_tips_at(
         Tips that moved; the others wait.
     """
     faces = last_faces(cracks)
-    instead = moved_on(faces, grown, size)
-    begin = np.where(instead[:, None], faces.anchor, faces.tip)
+    is_replaced = moved_on(faces, has_grown, size)
+    begin = np.where(is_replaced[:, None], faces.anchor, faces.tip)
     moves = np.linalg.norm(place - begin, axis=1) >= LEAST * size
     result = []
     for crack, rows in zip(cracks, rows_of(cracks)):
         result.append(
-            with_tips(crack, place[rows], moves[rows], instead[rows]) if crack.n_tips else crack
+            with_tips(crack, place[rows], moves[rows], is_replaced[rows]) if crack.n_tips else crack
         )
     return result, moves
 
@@ -131,18 +131,18 @@ class Meeting:
 
     tip: int
     x: Floats
-    away: float
+    distance: float
     crack: int
     other: int
     size: float
 
     @property
-    def soon(self) -> bool:
+    def is_soon(self) -> bool:
         """Whether the tip is too close to what it meets for another step."""
-        return self.away <= _SOON * self.size * (1.0 if self.other < 0 else _FACING)
+        return self.distance <= _SOON * self.size * (1.0 if self.other < 0 else _FACING)
 
 
-def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[Meeting]:
+def meetings(cracks: Sequence[Crack], mesh: Mesh, reach_in_cells: float = AHEAD) -> list[Meeting]:
     """What tips meet within some cells ahead of them, or have run across, the nearest first.
 
     Parameters
@@ -150,7 +150,7 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     cracks : sequence of Crack
         Placed, or advanced from placed ones.
     mesh : Mesh
-    ahead : float
+    reach_in_cells : float
         In cells.
     """
     if len(cracks) < 2:
@@ -161,32 +161,39 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, ahead: float = AHEAD) -> list[
     result = []
     for row in range(len(owner)):
         h, x = float(size[row]), faces.tip[row]
-        along = np.array([np.cos(faces.direction[row]), np.sin(faces.direction[row])])
-        facing = _facing_tip(row, faces, owner, 2 * _FACING * ahead * h, _BESIDE * h)
-        if facing is not None:
-            middle = (x + faces.tip[facing]) / 2
-            away = float((faces.tip[facing] - x) @ along) / 2
-            result.append(Meeting(row, middle, away, int(owner[facing]), facing, h))
+        direction = np.array([np.cos(faces.direction[row]), np.sin(faces.direction[row])])
+        facing_tip = _facing_tip(row, faces, owner, 2 * _FACING * reach_in_cells * h, _BESIDE * h)
+        if facing_tip is not None:
+            middle = (x + faces.tip[facing_tip]) / 2
+            half_distance = float((faces.tip[facing_tip] - x) @ direction) / 2
+            result.append(
+                Meeting(row, middle, half_distance, int(owner[facing_tip]), facing_tip, h)
+            )
             continue
-        flank = _flank(int(owner[row]), faces.anchor[row], x + ahead * h * along, cracks, mesh)
+        flank = _flank(
+            int(owner[row]), faces.anchor[row], x + reach_in_cells * h * direction, cracks, mesh
+        )
         if flank is not None:
             end, other = flank
             end = _behind_tips(end, cracks[other], _BEHIND * h)
-            result.append(Meeting(row, end, float((end - x) @ along), other, -1, h))
-    return sorted(result, key=lambda met: met.away)
+            result.append(Meeting(row, end, float((end - x) @ direction), other, -1, h))
+    return sorted(result, key=lambda meeting: meeting.distance)
 
 
 def _facing_tip(row: int, faces: Faces, owner: Ints, reach: float, room: float) -> int | None:
     """The tip of another crack that comes towards this one, or has come past it just now."""
     direction = faces.direction
-    along = np.array([np.cos(direction[row]), np.sin(direction[row])])
+    direction_of_tip = np.array([np.cos(direction[row]), np.sin(direction[row])])
     gap = faces.tip - faces.tip[row]
-    ahead, beside = gap @ along, np.abs(gap @ np.array([-along[1], along[0]]))
-    opposite = np.cos(direction - direction[row]) < -0.5
-    before = (faces.anchor - faces.anchor[row]) @ along > 0
-    near = (ahead < reach) & before & (beside <= room)
-    rows = np.nonzero(near & opposite & (owner != owner[row]))[0]
-    return int(rows[np.argmin(np.abs(ahead[rows]))]) if len(rows) else None
+    distance_ahead, distance_beside = (
+        gap @ direction_of_tip,
+        np.abs(gap @ np.array([-direction_of_tip[1], direction_of_tip[0]])),
+    )
+    is_opposite = np.cos(direction - direction[row]) < -0.5
+    is_before = (faces.anchor - faces.anchor[row]) @ direction_of_tip > 0
+    is_near = (distance_ahead < reach) & is_before & (distance_beside <= room)
+    rows = np.nonzero(is_near & is_opposite & (owner != owner[row]))[0]
+    return int(rows[np.argmin(np.abs(distance_ahead[rows]))]) if len(rows) else None
 
 
 def _flank(
@@ -199,11 +206,13 @@ def _flank(
             continue
         x = crossing_points(np.stack([begin, end]), crack.points)
         x = x[contains(mesh, x)] if len(x) else x
-        away = np.linalg.norm(x - begin, axis=1)
-        away = np.where(away > 1e-9 * np.linalg.norm(end - begin), away, np.inf)
-        if len(x) and away.min() < distance:
-            k = int(np.argmin(away))
-            best, distance = (x[k], other), float(away[k])
+        distance_to_points = np.linalg.norm(x - begin, axis=1)
+        distance_to_points = np.where(
+            distance_to_points > 1e-9 * np.linalg.norm(end - begin), distance_to_points, np.inf
+        )
+        if len(x) and distance_to_points.min() < distance:
+            k = int(np.argmin(distance_to_points))
+            best, distance = (x[k], other), float(distance_to_points[k])
     return best
 
 
@@ -215,24 +224,26 @@ def _behind_tips(x: Floats, crack: Crack, room: float) -> Floats:
         at_vertex = np.concatenate([[0.0], np.cumsum(length)])
         foot = closest_on_segment(x, line[:-1], line[1:])
         piece = int(np.argmin(np.linalg.norm(foot - x, axis=1)))
-        along = at_vertex[piece] + float(np.linalg.norm(foot[piece] - line[piece]))
-        if along < room < at_vertex[-1]:
+        distance_along = at_vertex[piece] + float(np.linalg.norm(foot[piece] - line[piece]))
+        if distance_along < room < at_vertex[-1]:
             piece = int(np.searchsorted(at_vertex, room, side="right")) - 1
             share = (room - at_vertex[piece]) / length[piece]
             x = (1 - share) * line[piece] + share * line[piece + 1]
     return x
 
 
-def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting]) -> list[Crack]:
+def joined(
+    cracks: Sequence[Crack], has_moved: Sequence[bool], meetings_made: Sequence[Meeting]
+) -> list[Crack]:
     """Cracks after meetings: tips that end on others are none, facing ones are gone.
 
     Parameters
     ----------
     cracks : sequence of Crack
         As the meetings were found with.
-    moved : sequence of bool
+    has_moved : sequence of bool
         For each tip whether its last point was added, so that it may be replaced.
-    met : sequence of Meeting
+    meetings_made : sequence of Meeting
     """
     result: list[Crack | None] = list(cracks)
     tip_of = [
@@ -240,23 +251,23 @@ def joined(cracks: Sequence[Crack], moved: Sequence[bool], met: Sequence[Meeting
     ]
     at_end = {}  # crack and whether it is the first point: where a facing pair meets
     pairs = []
-    for meeting in met:
+    for meeting in meetings_made:
         c, k = tip_of[meeting.tip]
         first = (cracks[c].tips or ())[k] == 0
         if meeting.other < 0:
             crack = result[c]
             assert crack is not None
-            result[c] = _with_new_end(crack, first, meeting.x, moved[meeting.tip], True)
+            result[c] = _with_new_end(crack, first, meeting.x, has_moved[meeting.tip], True)
         elif meeting.tip < meeting.other and (c, first) not in at_end:
-            other, there = tip_of[meeting.other]
-            last = (cracks[other].tips or ())[there] == 0
+            other, tip_number = tip_of[meeting.other]
+            last = (cracks[other].tips or ())[tip_number] == 0
             if (other, last) in at_end:
                 continue
             for key, row in (((c, first), meeting.tip), ((other, last), meeting.other)):
                 at_end[key] = meeting.x
                 crack = result[key[0]]
                 assert crack is not None
-                result[key[0]] = _with_new_end(crack, key[1], meeting.x, moved[row], False)
+                result[key[0]] = _with_new_end(crack, key[1], meeting.x, has_moved[row], False)
             pairs.append(((c, first), (other, last), meeting.x))
     number = list(range(len(cracks)))
     for (c, _), (other, _), x in pairs:
@@ -285,11 +296,11 @@ def _with_new_end(crack: Crack, first: bool, x: Floats, replace: bool, drop: boo
 
 def _crack_of_two(one: Crack, two: Crack, x: Floats) -> Crack:
     """Two cracks that end at x as one, in the direction of the first."""
-    begins = np.array_equal(one.points[0], x)
-    ends = two.points[::-1] if np.array_equal(two.points[0], x) == begins else two.points
-    free = [k for k in (0, len(two.points) - 1) if not np.array_equal(two.points[k], x)]
-    tip_beyond = any(k in (two.tips or ()) for k in free)
-    if begins:
+    is_begin = np.array_equal(one.points[0], x)
+    ends = two.points[::-1] if np.array_equal(two.points[0], x) == is_begin else two.points
+    free_ends = [k for k in (0, len(two.points) - 1) if not np.array_equal(two.points[k], x)]
+    tip_beyond = any(k in (two.tips or ()) for k in free_ends)
+    if is_begin:
         points = np.concatenate([ends, one.points[1:]])
         tips = [0] * tip_beyond + [len(points) - 1] * (len(one.points) - 1 in (one.tips or ()))
     else:
@@ -325,14 +336,16 @@ def ends_on_others(cracks: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
     return result
 
 
-def new_ends(before: Sequence[Crack], after: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
+def new_ends(
+    cracks_before: Sequence[Crack], cracks_after: Sequence[Crack]
+) -> list[tuple[int, int, Floats]]:
     """Ends on others that were not there before."""
-    known = {tuple(x.tolist()) for _, _, x in ends_on_others(before)}
-    return [end for end in ends_on_others(after) if tuple(end[2].tolist()) not in known]
+    known_ends = {tuple(x.tolist()) for _, _, x in ends_on_others(cracks_before)}
+    return [end for end in ends_on_others(cracks_after) if tuple(end[2].tolist()) not in known_ends]
 
 
 def new_unions(
-    before: Sequence[Crack], after: Sequence[Crack]
+    cracks_before: Sequence[Crack], cracks_after: Sequence[Crack]
 ) -> list[tuple[tuple[int, int], Floats]]:
     """Points at which two tips have become one crack; none in 3D.
 
@@ -340,19 +353,21 @@ def new_unions(
     -------
     list of (numbers of the cracks before, the smaller one first, place (2,))
     """
-    if len(after) >= len(before) or any(crack.tips is None for crack in after):
+    if len(cracks_after) >= len(cracks_before) or any(crack.tips is None for crack in cracks_after):
         return []
-    owner = {tuple(x): c for c, crack in enumerate(before) for x in crack.points.tolist()}
+    owner = {tuple(x): c for c, crack in enumerate(cracks_before) for x in crack.points.tolist()}
     result = []
-    for crack in after:
+    for crack in cracks_after:
         of_point = [owner.get(tuple(x), -1) for x in crack.points.tolist()]
         for k in range(1, len(of_point) - 1):
             if of_point[k] >= 0:
                 continue
-            left = next((c for c in of_point[k::-1] if c >= 0), -1)
-            right = next((c for c in of_point[k:] if c >= 0), -1)
-            if left != right and min(left, right) >= 0:
-                result.append(((min(left, right), max(left, right)), crack.points[k]))
+            left_crack = next((c for c in of_point[k::-1] if c >= 0), -1)
+            right_crack = next((c for c in of_point[k:] if c >= 0), -1)
+            if left_crack != right_crack and min(left_crack, right_crack) >= 0:
+                result.append(
+                    ((min(left_crack, right_crack), max(left_crack, right_crack)), crack.points[k])
+                )
     return result
 
 

@@ -85,20 +85,24 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
                 continue
             tree = triangle_tree(b.points, b.faces) if tree is None else tree
             x, normal = front.x[near_box], front.frame[near_box, 1]
-            closest = closest_in(tree, x, reach)
-            rows = np.nonzero((closest.triangle >= 0) & body.contains(x))[0]
+            nearest_point = closest_in(tree, x, reach)
+            rows = np.nonzero((nearest_point.triangle >= 0) & body.contains(x))[0]
             if not len(rows):
                 continue
-            way = closest.foot[rows] - x[rows]
-            across = np.einsum("ij,ij->i", way, normal[rows])
-            along = np.linalg.norm(way - across[:, None] * normal[rows], axis=1)
-            k = int(np.argmin(along))
+            way = nearest_point.foot[rows] - x[rows]
+            normal_distance = np.einsum("ij,ij->i", way, normal[rows])
+            offset = np.linalg.norm(way - normal_distance[:, None] * normal[rows], axis=1)
+            k = int(np.argmin(offset))
             row = rows[k]
-            if best is None or along[k] < best.width:
-                turn = float(tree.normal[closest.triangle[row]] @ normal[row])
-                faces = _is_on_front(b, closest.foot[row], tree.distance_tolerance)
+            if best is None or offset[k] < best.width:
+                turn = float(tree.normal[nearest_point.triangle[row]] @ normal[row])
+                faces = _is_on_front(b, nearest_point.foot[row], tree.distance_tolerance)
                 best = FrontGap(
-                    float(along[k]), float(abs(across[k])), turn, x[row] + way[k] / 2, faces
+                    float(offset[k]),
+                    float(abs(normal_distance[k])),
+                    turn,
+                    x[row] + way[k] / 2,
+                    faces,
                 )
     return best
 
@@ -161,29 +165,33 @@ def merged_crack(
     both = Crack(shifted.points, np.concatenate([one.faces, shifted.faces]))
     trees = tuple(triangle_tree(c.points, c.faces) for c in (other, one))
 
-    def blocked(tree: TriangleTree) -> Callable[[Front], Bools]:
+    def find_blocked(tree: TriangleTree) -> Callable[[Front], Bools]:
         return lambda front: _blocked_points(front, tree, radius, step)
 
-    facing = (front_frames(one), front_frames(shifted))
-    flags = tuple(map(blocked, trees))
+    facing_fronts = (front_frames(one), front_frames(shifted))
+    flags = tuple(map(find_blocked, trees))
 
     if body is None:
-        return _with_gap_closed(both, facing, (), flags, radius, size)
+        return _with_gap_closed(both, facing_fronts, (), flags, radius, size)
 
-    def closed(count: int) -> Crack:
-        short = tuple([_with_short_ends(f, count, body) for f in group] for group in facing)
-        return _with_gap_closed(both, (short[0], short[1]), (), flags, radius, size)
+    def close_gap(count: int) -> Crack:
+        short_fronts = tuple(
+            [_with_short_ends(f, count, body) for f in group] for group in facing_fronts
+        )
+        return _with_gap_closed(both, (short_fronts[0], short_fronts[1]), (), flags, radius, size)
 
-    return _first_that_closes(closed, facing)
+    return _first_that_closes(close_gap, facing_fronts)
 
 
-def _first_that_closes(closed: Callable[[int], Crack], groups: Sequence[Sequence[Front]]) -> Crack:
+def _first_that_closes(
+    close_gap: Callable[[int], Crack], groups: Sequence[Sequence[Front]]
+) -> Crack:
     """A gap closed between fronts with all, or a few, of their points outside the body."""
-    whole = max(len(front.x) for group in groups for front in group)
+    longest_front = max(len(front.x) for group in groups for front in group)
     is_open = any(not front.closed for group in groups for front in group)
-    for count in (whole, *range(8, -1, -1)) if is_open else (whole,):
+    for count in (longest_front, *range(8, -1, -1)) if is_open else (longest_front,):
         try:
-            return closed(count)
+            return close_gap(count)
         except GeometryError as error:
             failure = error
     raise failure
@@ -223,10 +231,10 @@ def own_gap(crack: Crack, body: Body, reach: float) -> OwnGap | None:
     faces &= np.einsum("ij,ij->i", n[pairs[:, 0]], n[pairs[:, 1]]) > _ANGLE
     faces &= width < reach * size[pairs[:, 0]]
     pairs, width = pairs[faces], width[faces]
-    inside = body.contains(x[pairs].mean(axis=1)) if len(pairs) else np.zeros(0, dtype=bool)
-    if not inside.any():
+    is_inside = body.contains(x[pairs].mean(axis=1)) if len(pairs) else np.zeros(0, dtype=bool)
+    if not is_inside.any():
         return None
-    k = int(np.argmin(np.where(inside, width, np.inf)))
+    k = int(np.argmin(np.where(is_inside, width, np.inf)))
     return OwnGap(float(width[k]), float(size[pairs[k, 0]]), x[pairs[k]].mean(axis=0))
 
 
@@ -266,7 +274,7 @@ def with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> 
             "ligament between them cannot be closed. End growth before, or give what has joined."
         )
 
-    def blocked(k: int) -> Callable[[Front], Bools]:
+    def find_blocked(k: int) -> Callable[[Front], Bools]:
         f, run = parts[k]
 
         def flags(front: Front) -> Bools:
@@ -278,16 +286,21 @@ def with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> 
 
     pair = ([fronts[parts[0][0]]], [fronts[parts[1][0]]])
     rest = [front for f, front in enumerate(fronts) if f not in (parts[0][0], parts[1][0])]
-    bare = Crack(crack.points, crack.faces)
-    closed = _with_gap_closed(bare, pair, rest, (blocked(0), blocked(1)), radius, size)
-    return replace(closed, ends_on=crack.ends_on)
+    crack_without_ends = Crack(crack.points, crack.faces)
+    closed_crack = _with_gap_closed(
+        crack_without_ends, pair, rest, (find_blocked(0), find_blocked(1)), radius, size
+    )
+    return replace(closed_crack, ends_on=crack.ends_on)
 
 
 def _faces(fronts: Sequence[Front], one: tuple[int, Ints], other: tuple[int, Ints]) -> bool:
     """Whether two pieces of fronts look towards each other."""
-    (f, run), (g, also) = one, other
-    ahead, back = fronts[f].frame[run, 0].mean(axis=0), fronts[g].frame[also, 0].mean(axis=0)
-    return bool(ahead @ back < 0)
+    (f, run), (g, run_of_other) = one, other
+    direction, opposite_direction = (
+        fronts[f].frame[run, 0].mean(axis=0),
+        fronts[g].frame[run_of_other, 0].mean(axis=0),
+    )
+    return bool(direction @ opposite_direction < 0)
 
 
 def without_inner_front(crack: Crack, number: int) -> tuple[Crack, Floats]:
@@ -328,28 +341,28 @@ def through_holes(
                 continue
             way = other.x[0] - one.x[-1]
             gap = float(np.linalg.norm(way))
-            beside = follower.get(int(one.number[-1])) == int(other.number[0])
-            ahead = min(one.frame[-1, 2] @ way, other.frame[0, 2] @ way)
-            if not beside and ahead > _FACES * gap:
-                near = gap < _WIDE * float(body.cell_size(one.x[-1:])[0])
-                between = one.x[-1] + np.linspace(0.0, 1.0, 9)[:, None] * way
-                beside = near and not body.contains(between).any()
+            is_beside = follower.get(int(one.number[-1])) == int(other.number[0])
+            facing_share = min(one.frame[-1, 2] @ way, other.frame[0, 2] @ way)
+            if not is_beside and facing_share > _FACES * gap:
+                is_near = gap < _WIDE * float(body.cell_size(one.x[-1:])[0])
+                points_between = one.x[-1] + np.linspace(0.0, 1.0, 9)[:, None] * way
+                is_beside = is_near and not body.contains(points_between).any()
             frame = one.frame[-1]
-            if beside and is_at_hole(one.x[-1] + way / 2, frame[0], frame[1], body):
+            if is_beside and is_at_hole(one.x[-1] + way / 2, frame[0], frame[1], body):
                 pairs.append((gap, i, j))
-    following: dict[int, int] = {}
+    next_front: dict[int, int] = {}
     for _, i, j in sorted(pairs):
-        if i not in following and j not in following.values():
-            following[i] = j
-    chains, starts = [], sorted(set(range(len(fronts))) - set(following.values()))
-    remaining = set(range(len(fronts)))
-    while remaining:
-        k = starts.pop(0) if starts else min(remaining)
+        if i not in next_front and j not in next_front.values():
+            next_front[i] = j
+    chains, starts = [], sorted(set(range(len(fronts))) - set(next_front.values()))
+    open_fronts = set(range(len(fronts)))
+    while open_fronts:
+        k = starts.pop(0) if starts else min(open_fronts)
         row: list[int] = []
-        while k in remaining:
+        while k in open_fronts:
             row.append(k)
-            remaining.discard(k)
-            k = following.get(k, -1)
+            open_fronts.discard(k)
+            k = next_front.get(k, -1)
         chains.append((tuple(row), fronts[row[0]].closed or k == row[0]))
     return chains
 
@@ -388,20 +401,20 @@ def joined_fronts(crack: Crack, body: Body) -> Crack | None:
     if not _meets_in_hole(fronts, body):
         return None
     rows = through_holes(crack, fronts, body)
-    follows = {pair for row, _ in rows for pair in zip(row, row[1:])}
-    follows |= {(row[-1], row[0]) for row, goes_round in rows if goes_round}
+    pairs_in_order = {pair for row, _ in rows for pair in zip(row, row[1:])}
+    pairs_in_order |= {(row[-1], row[0]) for row, goes_round in rows if goes_round}
     for i, one in enumerate(fronts):
         for j, other in enumerate(fronts[: i + 1]):
             pair = (one, other) if i != j else _thirds(one)
-            if pair is None or (i, j) in follows or (j, i) in follows:
+            if pair is None or (i, j) in pairs_in_order or (j, i) in pairs_in_order:
                 continue
             ends = _meeting_ends(*pair, body)
-            met = _meeting_place(*pair, body) if ends is None else ends[2]
-            if met is None:
+            meeting_place = _meeting_place(*pair, body) if ends is None else ends[2]
+            if meeting_place is None:
                 continue
             rest = [front for k, front in enumerate(fronts) if k not in (i, j)]
             rest += [] if i != j else [_middle_of_front(one, *pair)]
-            return _join(crack, pair, rest, float(body.cell_size(met[None])[0]), body)
+            return _join(crack, pair, rest, float(body.cell_size(meeting_place[None])[0]), body)
     return None
 
 
@@ -439,12 +452,12 @@ def _piece(front: Front, part: slice) -> Front:
 
 def _ends_outside(front: Front, body: Body) -> list[tuple[int, int]]:
     """Last point in the body at each end of an open front that leaves it, and which end that is."""
-    inside = body.contains(front.x)
-    if front.closed or not inside.any():
+    is_inside = body.contains(front.x)
+    if front.closed or not is_inside.any():
         return []
-    places = np.nonzero(inside)[0]
+    places = np.nonzero(is_inside)[0]
     both = ((int(places[0]), 0), (int(places[-1]), -1))
-    return [(place, end) for place, end in both if not inside[end]]
+    return [(place, end) for place, end in both if not is_inside[end]]
 
 
 def _meeting_ends(one: Front, other: Front, body: Body) -> tuple[int, int, Floats] | None:
@@ -455,12 +468,12 @@ def _meeting_ends(one: Front, other: Front, body: Body) -> tuple[int, int, Float
             size = float(body.cell_size(((x + y) / 2)[None])[0])
             way = (y - x) if second == 0 else (x - y)  # as a front runs that goes on from one
             gap = float(np.linalg.norm(way))
-            aligned = first != second and bool(one.frame[p, 1] @ other.frame[q, 1] > _ANGLE)
-            aligned &= min(one.frame[p, 2] @ way, other.frame[q, 2] @ way) > _FACES * gap
-            if not aligned or gap > _WIDE * size:
+            is_aligned = first != second and bool(one.frame[p, 1] @ other.frame[q, 1] > _ANGLE)
+            is_aligned &= min(one.frame[p, 2] @ way, other.frame[q, 2] @ way) > _FACES * gap
+            if not is_aligned or gap > _WIDE * size:
                 continue
-            between = x + np.linspace(0.0, 1.0, 9)[:, None] * (y - x)
-            if body.contains(between).all():
+            points_between = x + np.linspace(0.0, 1.0, 9)[:, None] * (y - x)
+            if body.contains(points_between).all():
                 return first, second, np.asarray((x + y) / 2)
     return None
 
@@ -474,20 +487,22 @@ def _meeting_place(one: Front, other: Front, body: Body) -> Floats | None:
     r, segment, position = front_distance(
         one.x[rows], other.x, other.closed, _NEAR * float(size.max())
     )
-    near = (segment >= 0) & (r < _NEAR * size) & (r > 0)
-    rows, r, size = rows[near], r[near], size[near]
-    segment, position = segment[near], position[near]
+    is_near = (segment >= 0) & (r < _NEAR * size) & (r > 0)
+    rows, r, size = rows[is_near], r[is_near], size[is_near]
+    segment, position = segment[is_near], position[is_near]
     if not len(rows):
         return None
-    t, after = position[:, None], (segment + 1) % len(other.x)
-    foot = (1 - t) * other.x[segment] + t * other.x[after]
-    frame = (1 - t[..., None]) * other.frame[segment] + t[..., None] * other.frame[after]
+    t, next_point = position[:, None], (segment + 1) % len(other.x)
+    foot = (1 - t) * other.x[segment] + t * other.x[next_point]
+    frame = (1 - t[..., None]) * other.frame[segment] + t[..., None] * other.frame[next_point]
     way = foot - one.x[rows]
-    ahead, normal = one.frame[rows, 0], one.frame[rows, 1]
-    across = np.abs(np.einsum("ij,ij->i", way, normal))
-    faces = np.einsum("ij,ij->i", way, ahead) > _FACES * r
+    direction, normal = one.frame[rows, 0], one.frame[rows, 1]
+    normal_distance = np.abs(np.einsum("ij,ij->i", way, normal))
+    faces = np.einsum("ij,ij->i", way, direction) > _FACES * r
     faces &= np.einsum("ij,ij->i", way, frame[:, 0]) < -_FACES * r
-    faces &= (np.einsum("ij,ij->i", normal, frame[:, 1]) > _ANGLE) & (across < OFFSET * size)
+    faces &= (np.einsum("ij,ij->i", normal, frame[:, 1]) > _ANGLE) & (
+        normal_distance < OFFSET * size
+    )
     if not faces.any():
         return None
     k = int(np.argmin(np.where(faces, r / size, np.inf)))
@@ -503,29 +518,32 @@ def _join(
     """
     ends = _nearest_ends(*pair, body)
 
-    def blocked(k: int, fronts: tuple[Front, Front]) -> Callable[[Front], Bools]:
+    def find_blocked(k: int, fronts: tuple[Front, Front]) -> Callable[[Front], Bools]:
         other = fronts[1 - k]
 
         def ahead(front: Front) -> Bools:
             centre = front.x + radius * front.frame[:, 0]
             r, segment, _ = front_distance(centre, other.x, other.closed, radius)
             flag = (segment >= 0) & (r < radius * (1 - 1e-9))
-            inside = np.nonzero(body.contains(front.x))[0]
+            inner_rows = np.nonzero(body.contains(front.x))[0]
             if not front.closed:
-                flag[: inside[0]] = ends is not None and ends[k] == 0
-                flag[inside[-1] + 1 :] = ends is not None and ends[k] == -1
+                flag[: inner_rows[0]] = ends is not None and ends[k] == 0
+                flag[inner_rows[-1] + 1 :] = ends is not None and ends[k] == -1
             return np.asarray(flag)
 
         return ahead
 
-    def closed(count: int) -> Crack:
-        short = (_with_short_ends(pair[0], count, body), _with_short_ends(pair[1], count, body))
+    def close_gap(count: int) -> Crack:
+        short_pair = (
+            _with_short_ends(pair[0], count, body),
+            _with_short_ends(pair[1], count, body),
+        )
         return _with_gap_closed(
-            Crack(crack.points, crack.faces), ([short[0]], [short[1]]), rest,
-            (blocked(0, short), blocked(1, short)), radius, radius / 2,
+            Crack(crack.points, crack.faces), ([short_pair[0]], [short_pair[1]]), rest,
+            (find_blocked(0, short_pair), find_blocked(1, short_pair)), radius, radius / 2,
         )  # fmt: skip
 
-    return _first_that_closes(closed, (pair,))
+    return _first_that_closes(close_gap, (pair,))
 
 
 def _nearest_ends(one: Front, other: Front, body: Body) -> tuple[int, int] | None:
@@ -545,24 +563,24 @@ def _nearest_ends(one: Front, other: Front, body: Body) -> tuple[int, int] | Non
 
 def _with_short_ends(front: Front, count: int, body: Body) -> Front:
     """An open front with at most some points outside the body at each end."""
-    inside = np.nonzero(body.contains(front.x))[0]
-    if front.closed or not len(inside):
+    inner_rows = np.nonzero(body.contains(front.x))[0]
+    if front.closed or not len(inner_rows):
         return front
-    return _piece(front, slice(max(int(inside[0]) - count, 0), int(inside[-1]) + 1 + count))
+    return _piece(front, slice(max(int(inner_rows[0]) - count, 0), int(inner_rows[-1]) + 1 + count))
 
 
 def _with_gap_closed(
     crack: Crack,
     pair: tuple[Sequence[Front], Sequence[Front]],
     rest: Sequence[Front],
-    blocked: tuple[Callable[[Front], Bools], ...],
+    blocked_by: tuple[Callable[[Front], Bools], ...],
     radius: float,
     size: float,
 ) -> Crack:
     """A crack with faces between those pieces of two groups of fronts that face each other."""
     runs, others = (
         [(front, run) for front in group for run in _runs(front, is_blocked(front))]
-        for group, is_blocked in zip(pair, blocked)
+        for group, is_blocked in zip(pair, blocked_by)
     )
     if not runs or len(runs) != len(others):
         raise GeometryError(
@@ -571,18 +589,18 @@ def _with_gap_closed(
         )
     points, faces = [crack.points], [crack.faces]
     every = (*pair[0], *pair[1], *rest)
-    following = dict(side for front in every for side in _sides(front))
+    next_number = dict(side for front in every for side in _sides(front))
     count = len(crack.points)
     for front, run in runs:
-        mate = others.pop(_facing_number(front, run, others))
-        patch = _patch(front, run, *mate, radius, size, count)
+        facing_run = others.pop(_facing_number(front, run, others))
+        patch = _patch(front, run, *facing_run, radius, size, count)
         for number in patch.used:
-            following.pop(int(number), None)
-        following.update(patch.sides)
+            next_number.pop(int(number), None)
+        next_number.update(patch.sides)
         points.append(patch.points)
         faces.append(patch.faces)
         count += len(patch.points)
-    return Crack(np.concatenate(points), np.concatenate(faces), None, tuple(_chains(following)))
+    return Crack(np.concatenate(points), np.concatenate(faces), None, tuple(_chains(next_number)))
 
 
 @dataclass(frozen=True)
@@ -617,23 +635,23 @@ def _blocked_points(front: Front, tree: TriangleTree, radius: float, step: float
     Beyond a step the other crack is seen as it lies along the surface.
     """
     centre = front.x + radius * front.frame[:, 0]
-    closest = closest_in(tree, centre, float(np.hypot(radius, step)))
-    way = closest.foot - centre
-    across = np.einsum("ij,ij->i", way, front.frame[:, 1])
-    along = np.sqrt(np.maximum(closest.distance**2 - across**2, 0.0))
-    distance = np.where(np.abs(across) <= step, along, closest.distance)
-    return np.asarray((closest.triangle >= 0) & (distance < radius * (1 - 1e-9)))
+    nearest_point = closest_in(tree, centre, float(np.hypot(radius, step)))
+    way = nearest_point.foot - centre
+    normal_distance = np.einsum("ij,ij->i", way, front.frame[:, 1])
+    distance_along = np.sqrt(np.maximum(nearest_point.distance**2 - normal_distance**2, 0.0))
+    distance = np.where(np.abs(normal_distance) <= step, distance_along, nearest_point.distance)
+    return np.asarray((nearest_point.triangle >= 0) & (distance < radius * (1 - 1e-9)))
 
 
-def _runs(front: Front, blocked: Bools) -> list[FacingPart]:
-    m = len(blocked)
-    if front.closed and blocked.all():
+def _runs(front: Front, is_blocked: Bools) -> list[FacingPart]:
+    m = len(is_blocked)
+    if front.closed and is_blocked.all():
         raise GeometryError(
             f"the front around {at(front.x.mean(axis=0))} faces another crack all the way round: "
             "one of them encloses the other."
         )
     result = []
-    for run in runs_of(blocked) if front.closed else open_runs(blocked):
+    for run in runs_of(is_blocked) if front.closed else open_runs(is_blocked):
         first, last = int(run[0]), int(run[-1])
         if front.closed:
             count = len(run) + 2
@@ -649,18 +667,18 @@ def _runs(front: Front, blocked: Bools) -> list[FacingPart]:
 
 def _sides(front: Front) -> list[tuple[int, int]]:
     number = front.number.tolist()
-    ahead = number[1:] + number[:1] if front.closed else number[1:]
-    return list(zip(number, ahead))
+    next_number = number[1:] + number[:1] if front.closed else number[1:]
+    return list(zip(number, next_number))
 
 
 def _facing_number(front: Front, run: FacingPart, others: list[tuple[Front, FacingPart]]) -> int:
     """Number of the piece of the other crack's fronts that faces this one."""
     middle = front.x[list(run.place)].mean(axis=0)
-    away = [
+    distances = [
         float(np.linalg.norm(other.x[list(piece.place)].mean(axis=0) - middle))
         for other, piece in others
     ]
-    return int(np.argmin(away))
+    return int(np.argmin(distances))
 
 
 def _patch(
@@ -680,9 +698,9 @@ def _patch(
         a, b = _up_to_end(front, a, 0, radius), _up_to_end(other, b, -1, radius)
     if at_stop:
         a, b = _up_to_end(front, a, -1, radius), _up_to_end(other, b, 0, radius)
-    none = np.zeros((0, 3))
-    stop = none if at_stop else _arc(front, a[-1], other, b[0], size)
-    start = none if at_start else _arc(other, b[-1], front, a[0], size)
+    no_triangles = np.zeros((0, 3))
+    stop = no_triangles if at_stop else _arc(front, a[-1], other, b[0], size)
+    start = no_triangles if at_start else _arc(other, b[-1], front, a[0], size)
     stop_number = count + np.arange(len(stop))
     start_number = count + len(stop) + np.arange(len(start))
     number = np.concatenate([front.number[a], stop_number, other.number[b], start_number])
@@ -694,9 +712,9 @@ def _patch(
     if not at_stop:
         lines.append([other.number[b[0]], *stop_number[::-1], front.number[a[-1]]])
     sides = {int(p): int(q) for line in lines for p, q in zip(line, line[1:])}
-    used = np.concatenate([front.number[a[:-1]], other.number[b[:-1]]])
+    used_numbers = np.concatenate([front.number[a[:-1]], other.number[b[:-1]]])
     normal = np.concatenate([front.frame[a, 1], other.frame[b, 1]]).mean(axis=0)
-    return _Patch(np.concatenate([stop, start]), number[_triangles(x, normal)], sides, used)
+    return _Patch(np.concatenate([stop, start]), number[_triangles(x, normal)], sides, used_numbers)
 
 
 def _up_to_end(front: Front, place: list[int], end: int, radius: float) -> list[int]:
@@ -705,16 +723,16 @@ def _up_to_end(front: Front, place: list[int], end: int, radius: float) -> list[
     There both fronts lie outside the body, where one may be longer than the other.
     """
     m = len(front.x)
-    remaining = list(range(place[0])) if end == 0 else list(range(place[-1] + 1, m))
-    if not remaining:
+    rest = list(range(place[0])) if end == 0 else list(range(place[-1] + 1, m))
+    if not rest:
         return place
-    way = np.linalg.norm(front.x[remaining] - front.x[place[end]], axis=1)
+    way = np.linalg.norm(front.x[rest] - front.x[place[end]], axis=1)
     if front.closed or way.max() > _LOOSE * radius:
         raise GeometryError(
             f"a front ends where it faces another crack at {at(front.x[place[end]])}, whose front "
             "goes on: the gap between them cannot be closed."
         )
-    return remaining + place if end == 0 else place + remaining
+    return rest + place if end == 0 else place + rest
 
 
 def _arc(one: Front, i: int, other: Front, j: int, size: float) -> Floats:
@@ -723,18 +741,18 @@ def _arc(one: Front, i: int, other: Front, j: int, size: float) -> Floats:
     The cubic of a circle that both fronts touch.
     """
     first, last = one.x[i], other.x[j]
-    away, back = -one.frame[i, 2], other.frame[j, 2]
-    turn = float(np.arccos(np.clip(-(away @ back), -1.0, 1.0)))
+    tangent_out, tangent_in = -one.frame[i, 2], other.frame[j, 2]
+    turn = float(np.arccos(np.clip(-(tangent_out @ tangent_in), -1.0, 1.0)))
     chord = float(np.linalg.norm(last - first))
     radius = chord / (2 * max(np.sin(turn / 2), 0.1))
     handle = 4 / 3 * np.tan(turn / 4) * radius if turn > 0.1 else chord / 3
     count = max(2, round(max(turn * radius, chord) / size))
     t = (np.arange(1, count) / count)[:, None]
-    second, third = first + handle * away, last + handle * back
+    second, third_point = first + handle * tangent_out, last + handle * tangent_in
     return np.asarray(
         (1 - t) ** 3 * first
         + 3 * t * (1 - t) ** 2 * second
-        + 3 * t**2 * (1 - t) * third
+        + 3 * t**2 * (1 - t) * third_point
         + t**3 * last
     )
 
@@ -743,20 +761,20 @@ def _triangles(x: Floats, normal: Floats) -> Ints:
     """Triangles of an outline `(m, 3)` that is nearly plane, run through round the normal."""
     normal = unit(normal)
     first = unit(np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))]))
-    flat = (x - x.mean(axis=0)) @ np.stack([first, np.cross(normal, first)], axis=1)
-    following = np.roll(flat, -1, axis=0)
-    if self_crossing(flat) is not None or cross(flat, following).sum() <= 0:
+    plane_points = (x - x.mean(axis=0)) @ np.stack([first, np.cross(normal, first)], axis=1)
+    next_points = np.roll(plane_points, -1, axis=0)
+    if self_crossing(plane_points) is not None or cross(plane_points, next_points).sum() <= 0:
         raise GeometryError(
             f"the gap between two fronts around {at(x.mean(axis=0))} has an outline that crosses "
             "itself: it cannot be closed. Take a smaller da."
         )
-    return without_slivers(flat, ear_clipped(flat))
+    return without_slivers(plane_points, ear_clipped(plane_points))
 
 
-def _chains(following: dict[int, int]) -> list[Ints]:
+def _chains(next_number: dict[int, int]) -> list[Ints]:
     """Fronts as point numbers: open ones first from their beginning, closed ones repeat theirs."""
-    following_points, result = dict(following), []
-    starts = sorted(set(following) - set(following.values()))
+    following_points, result = dict(next_number), []
+    starts = sorted(set(next_number) - set(next_number.values()))
     while following_points:
         begin = starts.pop(0) if starts else min(following_points)
         line = [begin]

@@ -64,26 +64,28 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if first_time:
         _check_inside(points, mesh)
-    within = contains(mesh, points[[0, last]])
+    is_inside = contains(mesh, points[[0, last]])
     tips = []
-    for end, inside in zip((0, last), within.tolist()):
-        inward = 1 if end == 0 else last - 1
-        out = (points[end] - points[inward]) / np.linalg.norm(points[end] - points[inward])
+    for end, is_end_inside in zip((0, last), is_inside.tolist()):
+        inner_point = 1 if end == 0 else last - 1
+        direction = (points[end] - points[inner_point]) / np.linalg.norm(
+            points[end] - points[inner_point]
+        )
         gap, size = nearest_boundary(mesh, points[end])
-        if end in candidates and inside and gap > MOUTH * size:
+        if end in candidates and is_end_inside and gap > MOUTH * size:
             tips.append(end)
             continue
         if end not in candidates:
             continue
-        if inside:
-            _check_nick(mesh, points[end], out, gap, size)
-        outside = -gap if inside else gap
-        if outside < size:
-            way, prolonged = _prolonged_end(mesh, points[end], out, size)
-            if first_time and inside:
+        if is_end_inside:
+            _check_nick(mesh, points[end], direction, gap, size)
+        distance_out = -gap if is_end_inside else gap
+        if distance_out < size:
+            way, new_end = _prolonged_end(mesh, points[end], direction, size)
+            if first_time and is_end_inside:
                 _check_mouth(points[end], gap, size, way)
-            points[end] = prolonged
-    placed = Crack(points, crack.faces, tuple(tips))
+            points[end] = new_end
+    placed_crack = Crack(points, crack.faces, tuple(tips))
     if tips:
         h = cell_sizes(mesh, points[tips])
         if length.sum() < h.min():
@@ -92,7 +94,7 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
                 f"the cell there ({h.min():.4g}): refine the mesh around it (adapt does), or leave "
                 "it out."
             )
-    return placed
+    return placed_crack
 
 
 def _check_inside(points: Floats, mesh: Mesh) -> None:
@@ -149,10 +151,13 @@ def _check_mouth(end: Floats, gap: float, size: float, way: float) -> None:
         )
 
 
-def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -> None:
+def _check_nick(mesh: Mesh, end: Floats, direction: Floats, gap: float, size: float) -> None:
     """Raise where a crack has just come in through the boundary that its end is close to."""
-    ahead = end + 0.25 * size * out
-    if contains(mesh, ahead[None])[0] and nearest_boundary(mesh, ahead)[0] > gap + 0.01 * size:
+    place_ahead = end + 0.25 * size * direction
+    if (
+        contains(mesh, place_ahead[None])[0]
+        and nearest_boundary(mesh, place_ahead)[0] > gap + 0.01 * size
+    ):
         raise CoarseMeshError(
             f"the crack ends at {at(end)}, {gap:.4g} inside the boundary that it "
             f"comes from, which is less than half a cell ({size:.4g}): refine the mesh there, or "
@@ -160,19 +165,19 @@ def _check_nick(mesh: Mesh, end: Floats, out: Floats, gap: float, size: float) -
         )
 
 
-def _prolonged_end(mesh: Mesh, end: Floats, out: Floats, size: float) -> tuple[float, Floats]:
+def _prolonged_end(mesh: Mesh, end: Floats, direction: Floats, size: float) -> tuple[float, Floats]:
     """How far an end is from leaving the body, and the end moved one cell outside.
 
     Half way across a narrower gap in the body.
     """
     step = size / 8
     steps = step * np.arange(97)
-    inside = contains(mesh, end + steps[:, None] * out)
-    first_out = int(np.argmin(inside)) if not inside.all() else len(steps) - 1
-    again = np.nonzero(inside[first_out:])[0]
-    gap = float(again[0]) * step if len(again) else np.inf
+    is_inside = contains(mesh, end + steps[:, None] * direction)
+    first_out = int(np.argmin(is_inside)) if not is_inside.all() else len(steps) - 1
+    rows_inside = np.nonzero(is_inside[first_out:])[0]
+    gap = float(rows_inside[0]) * step if len(rows_inside) else np.inf
     way = float(steps[first_out])
-    return way, np.asarray(end + out * (way + min(size, gap / 2)))
+    return way, np.asarray(end + direction * (way + min(size, gap / 2)))
 
 
 def vertices_on_mesh(crack: Crack, mesh: Mesh) -> Crack:
@@ -267,14 +272,14 @@ def _check_flanks(number: int, cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     if len(cracks) < 2:
         return
     x, frame = tip_frames(cracks[number])
-    for end, size, ahead in zip(x, cell_sizes(mesh, x), frame[:, 0]):
+    for end, size, direction in zip(x, cell_sizes(mesh, x), frame[:, 0]):
         for other, crack in enumerate(cracks):
             if other == number:
                 continue
             foot = closest_on_segment(end, crack.points[:-1], crack.points[1:])
             distance = np.linalg.norm(foot - end, axis=1)
             nearest = int(np.argmin(distance))
-            if (foot[nearest] - end) @ ahead < _TOWARDS * distance[nearest]:
+            if (foot[nearest] - end) @ direction < _TOWARDS * distance[nearest]:
                 continue
             if distance[nearest] < MOUTH * size and contains(mesh, foot[[nearest]])[0]:
                 raise CoarseMeshError(
@@ -322,12 +327,12 @@ def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
     for tip, end, size in zip(crack.tips or (), x, cell_sizes(mesh, x)):
         line = crack.points if tip == 0 else crack.points[::-1]
         length = np.linalg.norm(np.diff(line, axis=0), axis=1)
-        away = np.concatenate([[0.0], np.cumsum(length)])  # along the crack, from the tip
-        if away[-1] <= _OWN * size:
+        arc = np.concatenate([[0.0], np.cumsum(length)])  # along the crack, from the tip
+        if arc[-1] <= _OWN * size:
             continue
         # The piece on which that distance is reached counts from there.
-        first = int(np.searchsorted(away, _OWN * size, side="right")) - 1
-        begin = line[first] + (_OWN * size - away[first]) / length[first] * (
+        first = int(np.searchsorted(arc, _OWN * size, side="right")) - 1
+        begin = line[first] + (_OWN * size - arc[first]) / length[first] * (
             line[first + 1] - line[first]
         )
         remaining_line = np.concatenate([begin[None], line[first + 1 :]])
@@ -356,10 +361,10 @@ def _check_touch(
     high = np.minimum(a.points.max(axis=0), b.points.max(axis=0)) + reach
     if (low > high).any():
         return
-    touching = touching_points(a.points, b.points, reach)
-    touching = _points_off_junctions(touching, i, j, meeting, mesh)
-    if len(touching):
+    touching_places = touching_points(a.points, b.points, reach)
+    touching_places = _points_off_junctions(touching_places, i, j, meeting, mesh)
+    if len(touching_places):
         raise GeometryError(
-            f"cracks {i} and {j} touch or lie on each other near {at(touching[0])}: describe them "
-            "by one crack, or leave a few cells between them."
+            f"cracks {i} and {j} touch or lie on each other near {at(touching_places[0])}: "
+            "describe them by one crack, or leave a few cells between them."
         )

@@ -96,17 +96,17 @@ def rounded_surface(
 def _rounded_loop(x: Floats, loop: Ints, radius_at: dict[int, float]) -> Floats:
     """Points of one loop with arcs in place of some of its corners."""
     m = len(x)
-    along = np.roll(x, -1, axis=0) - x
-    length = np.linalg.norm(along, axis=1)
-    along = along / length[:, None]
-    turn = np.einsum("ij,ij->i", along, np.roll(along, 1, axis=0))
-    sharp = turn < _CORNER
+    directions = np.roll(x, -1, axis=0) - x
+    length = np.linalg.norm(directions, axis=1)
+    directions = directions / length[:, None]
+    turn = np.einsum("ij,ij->i", directions, np.roll(directions, 1, axis=0))
+    is_sharp = turn < _CORNER
     s = np.concatenate([[0.0], np.cumsum(length)])
     total = s[-1]
-    at = s[:-1][sharp]
+    at = s[:-1][is_sharp]
     keep = np.ones(m, dtype=bool)
     pieces: list[tuple[float, Floats]] = []
-    for i in np.nonzero(sharp)[0]:
+    for i in np.nonzero(is_sharp)[0]:
         radius = radius_at.get(int(loop[i]))
         if radius is None:
             continue
@@ -116,10 +116,12 @@ def _rounded_loop(x: Floats, loop: Ints, radius_at: dict[int, float]) -> Floats:
         half = np.arccos(np.clip(turn[i], -1, 1)) / 2
         reach = min(radius * np.tan(half), _ROOM * float(np.min(others, initial=total / 2)))
         arc = _arc(x, s, int(i), reach, half)
-        away = np.abs(s[:-1] - s[i])
-        away = np.minimum(away, total - away)
+        distance = np.abs(s[:-1] - s[i])
+        distance = np.minimum(distance, total - distance)
         # What is left of the side that the arc ends on should not be a splinter.
-        keep &= (away > reach + 0.4 * np.minimum(length, radius)) | (sharp & (away > reach))
+        keep &= (distance > reach + 0.4 * np.minimum(length, radius)) | (
+            is_sharp & (distance > reach)
+        )
         pieces.append((float(s[i]), arc))
     rows = [(float(s[i]), x[i : i + 1]) for i in np.nonzero(keep)[0]] + pieces
     rows.sort(key=lambda row: row[0])
@@ -167,30 +169,32 @@ def _triangles_within(
     for _ in range(30):
         points = np.concatenate([*outlines, inner])
         edges = _edges(outlines)
-        flat = (points - origin) @ plane.T
+        plane_points = (points - origin) @ plane.T
         if len(inner):
-            inside = is_within(flat, flat[edges])
-            inside[: len(points) - len(inner)] = True
-            inner = inner[inside[len(points) - len(inner) :]]
-            points, flat = points[inside], flat[inside]
-        faces = Delaunay(flat).simplices.astype(np.int64)
-        corner = flat[faces]
+            is_inside = is_within(plane_points, plane_points[edges])
+            is_inside[: len(points) - len(inner)] = True
+            inner = inner[is_inside[len(points) - len(inner) :]]
+            points, plane_points = points[is_inside], plane_points[is_inside]
+        faces = Delaunay(plane_points).simplices.astype(np.int64)
+        corner = plane_points[faces]
         area = cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         faces = np.where(area[:, None] < 0, faces[:, ::-1], faces)
         longest = np.max(np.sum((corner - np.roll(corner, 1, axis=1)) ** 2, axis=2), axis=1)
         # Three points of a straight side leave triangles that are round-off.
-        faces = faces[(np.abs(area) > 1e-9 * longest) & is_within(corner.mean(axis=1), flat[edges])]
+        faces = faces[
+            (np.abs(area) > 1e-9 * longest) & is_within(corner.mean(axis=1), plane_points[edges])
+        ]
         rim = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)]
         outer = {(int(b), int(a)) for a, b in rim}
-        missing = np.array([tuple(edge) not in outer for edge in edges.tolist()])
-        if not missing.any() and len(outer) == len(edges):
-            used, inverse = np.unique(faces, return_inverse=True)
-            return points[used], inverse.reshape(-1, 3)
-        present = np.isin(
+        is_missing = np.array([tuple(edge) not in outer for edge in edges.tolist()])
+        if not is_missing.any() and len(outer) == len(edges):
+            used_points, inverse = np.unique(faces, return_inverse=True)
+            return points[used_points], inverse.reshape(-1, 3)
+        is_present = np.isin(
             np.sort(edges, axis=1) @ np.array([len(points), 1]),
             (np.sort(rim, axis=1) @ np.array([len(points), 1])),
         )
-        outlines = _halved_sides(outlines, ~present)
+        outlines = _halved_sides(outlines, ~is_present)
     raise CoarseMeshError(
         f"the plane crack at {at(origin)} has an outline too narrow for rounded "
         "corners: refine the mesh there, or simplify the crack."
@@ -286,21 +290,21 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     """
     if crack.ends_on and crack.fronts is not None:
         return crack
-    placed, short = _placed_crack(crack, Body.of(mesh))
+    placed_crack, short_fronts = _placed_crack(crack, Body.of(mesh))
     if crack.fronts is None:
-        for front in short:
+        for front in short_fronts:
             warn(
                 f"{front}: it becomes part of the mouth, the crack cuts through there and has no "
                 "K. Take at least three cells along it, and across the body around it."
             )
-    elif crack.fronts and not placed.fronts:
-        for front in short:
+    elif crack.fronts and not placed_crack.fronts:
+        for front in short_fronts:
             if front.length > _LOST * front.cell:
                 warn(
                     f"{front}: the crack cuts through there, as if it had left the body. Take at "
                     "least three cells across what is left of the body there."
                 )
-    return placed
+    return placed_crack
 
 
 def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
@@ -332,16 +336,18 @@ def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:
     mesh : Mesh
     """
     crack = cracks[c]
-    placed = _placed_crack(crack, body_of(cracks, c, Body.of(mesh)))[0]
-    return replace(placed, ends_on=crack.ends_on)
+    placed_crack = _placed_crack(crack, body_of(cracks, c, Body.of(mesh)))[0]
+    return replace(placed_crack, ends_on=crack.ends_on)
 
 
-def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+def arms_placed(
+    given_cracks: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh
+) -> tuple[Crack, ...]:
     """Placed cracks, the arms among them placed before the cracks on which they end.
 
     Parameters
     ----------
-    given : sequence of Crack
+    given_cracks : sequence of Crack
         Arms whose fronts are known keep them.
     cracks : tuple of Crack
         The same ones, placed in the mesh.
@@ -354,20 +360,22 @@ def arms_placed(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -
     CoarseMeshError
         An arm without a front that is as long as a cell.
     """
-    if not any(crack.ends_on for crack in given):
+    if not any(crack.ends_on for crack in given_cracks):
         return cracks
-    check_numbers(given)
-    result = [replace(arm, ends_on=one.ends_on) for one, arm in zip(given, cracks, strict=True)]
-    for c, crack in enumerate(given):
+    check_numbers(given_cracks)
+    result = [
+        replace(arm, ends_on=one.ends_on) for one, arm in zip(given_cracks, cracks, strict=True)
+    ]
+    for c, crack in enumerate(given_cracks):
         if crack.ends_on and crack.fronts is None:
-            small = _check_reach(result, c, Body.of(mesh))
+            is_too_small = _check_reach(result, c, Body.of(mesh))
             try:
-                placed, short = _placed_crack(crack, body_of(result, c, Body.of(mesh)))
+                placed_crack, short_fronts = _placed_crack(crack, body_of(result, c, Body.of(mesh)))
             except CoarseMeshError as error:
-                raise CoarseMeshError(small) from error
-            if short and not placed.fronts:
-                raise CoarseMeshError(small)
-            result[c] = replace(placed, ends_on=crack.ends_on)
+                raise CoarseMeshError(is_too_small) from error
+            if short_fronts and not placed_crack.fronts:
+                raise CoarseMeshError(is_too_small)
+            result[c] = replace(placed_crack, ends_on=crack.ends_on)
     return tuple(result)
 
 
@@ -379,7 +387,7 @@ def _check_reach(cracks: Sequence[Crack], c: int, body: Body) -> str:
     x = cracks[c].points
     x = x[body.contains(x)]
     size = body.cell_size(x)
-    off = np.full(len(x), np.inf)
+    deviation = np.full(len(x), np.inf)
     for on, side in cracks[c].ends_on:
         depth = side * signed_in(triangle_tree(cracks[on].points, cracks[on].faces), x)[0]
         if not len(x) or (depth < 0).all():
@@ -394,13 +402,13 @@ def _check_reach(cracks: Sequence[Crack], c: int, body: Body) -> str:
                 f"{depth[k]:.4g} before it, as at {at(x[k])}. Draw it on to that crack or through "
                 "it (what lies beyond does not count), or take the other side of it."
             )
-        off = np.minimum(off, depth)
-    k = int(np.argmax(off))
+        deviation = np.minimum(deviation, depth)
+    k = int(np.argmax(deviation))
     names = " and ".join(f"{on} from side {side:+d}" for on, side in cracks[c].ends_on)
     return (
-        f"crack {c} ends on crack {names}, but comes only {off[k]:.4g} off it, as at {at(x[k])}: "
-        f"on that side no front is left as long as a cell ({size[k]:.4g}). Leave this arm out, or "
-        "refine the mesh there."
+        f"crack {c} ends on crack {names}, but comes only {deviation[k]:.4g} off it, as at "
+        f"{at(x[k])}: on that side no front is left as long as a cell ({size[k]:.4g}). Leave this "
+        "arm out, or refine the mesh there."
     )
 
 
@@ -427,36 +435,40 @@ def _placed_crack(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
         for a, b in zip(front, front[1:], strict=False)
     }
     fronts: list[tuple[int, Ints]] = []
-    short: list[ShortFront] = []
+    short_fronts: list[ShortFront] = []
     for loop in loops(faces):
         pairs = zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
         number = np.array([0 if first_time else owner.get(pair, -1) for pair in pairs])
         if (number < 0).all():
             continue
-        inside, too_short = _front_sides(points[loop], number >= 0, body)
-        short.extend(too_short)
-        if first_time and not inside.any() and not too_short:
-            short.extend(_front_along_boundary(points[loop], body))
-        if not first_time and not crack.ends_on and not inside.all():
-            outline = TraceOutline(loop, number >= 0, inside, first_time)
-            inside = inside | behind_holes(points, faces, outline, body)
-            outline = TraceOutline(loop, number >= 0, inside, first_time)
-            inside = inside | under_holes(points, faces, outline, body)
-        if inside.all():
+        is_inside, too_short = _front_sides(points[loop], number >= 0, body)
+        short_fronts.extend(too_short)
+        if first_time and not is_inside.any() and not too_short:
+            short_fronts.extend(_front_along_boundary(points[loop], body))
+        if not first_time and not crack.ends_on and not is_inside.all():
+            outline = TraceOutline(loop, number >= 0, is_inside, first_time)
+            is_inside = is_inside | behind_holes(points, faces, outline, body)
+            outline = TraceOutline(loop, number >= 0, is_inside, first_time)
+            is_inside = is_inside | under_holes(points, faces, outline, body)
+        if is_inside.all():
             fronts.append((int(number[0]), np.append(loop, loop[0])))
             continue
-        outline = TraceOutline(loop, number >= 0, inside, first_time)
+        outline = TraceOutline(loop, number >= 0, is_inside, first_time)
         points, faces, own_fronts = open_fronts(points, faces, outline, body)
         fronts.extend(
             (int(number[run[0]]), front)
-            for run, front in zip(runs_of(inside), own_fronts, strict=True)
+            for run, front in zip(runs_of(is_inside), own_fronts, strict=True)
         )
     fronts.sort(key=lambda pair: pair[0])
-    placed = Crack(points, faces, None, tuple(front for _, front in fronts))
+    placed_crack = Crack(points, faces, None, tuple(front for _, front in fronts))
     if first_time or crack.ends_on:
-        return placed, short
-    joined = joined_fronts(placed, body)
-    return _placed_crack(joined, body) if joined is not None else (placed, short)
+        return placed_crack, short_fronts
+    joined_crack = joined_fronts(placed_crack, body)
+    return (
+        _placed_crack(joined_crack, body)
+        if joined_crack is not None
+        else (placed_crack, short_fronts)
+    )
 
 
 def _check_inside(crack: Crack, body: Body) -> None:
@@ -466,8 +478,8 @@ def _check_inside(crack: Crack, body: Body) -> None:
     on_boundary = np.zeros((0, 3))
     # A body of one cell across has points on its boundary only.
     for x in (mesh.points, mesh.points[mesh.cells].mean(axis=1)):
-        closest = closest_in(tree, x, reach)
-        foot = closest.foot[closest.triangle >= 0]
+        nearest_point = closest_in(tree, x, reach)
+        foot = nearest_point.foot[nearest_point.triangle >= 0]
         if len(foot):
             depth, size = body.depth(foot)
             if (depth < -_TOUCH * size).any():
@@ -500,11 +512,11 @@ def _check_size(points: Floats, faces: Ints, body: Body) -> None:
     for k in np.nonzero(width < body.mesh.cell_size.max())[0]:
         x = points[edges[piece[owner] == k, 0]]
         depth, size = body.depth(x)
-        inside = depth < -_MOUTH * size
+        is_inside = depth < -_MOUTH * size
         cell = float(body.cell_size(x).min())
-        if width[k] < cell and inside.any():
+        if width[k] < cell and is_inside.any():
             raise CoarseMeshError(
-                f"the crack at {at(x[inside][0])} is {width[k]:.4g} wide, less "
+                f"the crack at {at(x[is_inside][0])} is {width[k]:.4g} wide, less "
                 f"than the cell there ({cell:.4g}): refine the mesh around it (adapt does), or "
                 "leave it out."
             )
@@ -514,18 +526,20 @@ def _refined_faces(points: Floats, faces: Ints, body: Body) -> tuple[Floats, Int
     """Faces divided until the sides of the outline in and near the body are shorter than a cell."""
     for _ in range(40):
         pairs = sides(faces)
-        marked = on_rim(faces)
-        ends = points[pairs[marked]]
+        is_rim = on_rim(faces)
+        ends = points[pairs[is_rim]]
         middle = ends.mean(axis=1)
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         size = body.cell_size(middle)
-        long = length > SIDE * size
-        if long.any():
-            long[long] = body.depth(middle[long])[0] < length[long] / 2 + _NEAR * size[long]
-        if not long.any():
+        is_long = length > SIDE * size
+        if is_long.any():
+            is_long[is_long] = (
+                body.depth(middle[is_long])[0] < length[is_long] / 2 + _NEAR * size[is_long]
+            )
+        if not is_long.any():
             break
-        marked[marked] = long
-        points, faces = split_sides(points, faces, marked)
+        is_rim[is_rim] = is_long
+        points, faces = split_sides(points, faces, is_rim)
     return points, faces
 
 
@@ -539,11 +553,11 @@ def _with_round_corners(points: Floats, faces: Ints, body: Body) -> tuple[Floats
     corners: list[int] = []
     for loop in loops(faces):
         x = points[loop]
-        along = unit(np.roll(x, -1, axis=0) - x)
-        turn = np.einsum("ij,ij->i", along, np.roll(along, 1, axis=0))
+        directions = unit(np.roll(x, -1, axis=0) - x)
+        turn = np.einsum("ij,ij->i", directions, np.roll(directions, 1, axis=0))
         depth, size = body.depth((x + np.roll(x, -1, axis=0)) / 2)
-        inside = depth < -_MOUTH * size
-        corners.extend(loop[(turn < SMOOTH) & inside & np.roll(inside, 1)].tolist())
+        is_inside = depth < -_MOUTH * size
+        corners.extend(loop[(turn < SMOOTH) & is_inside & np.roll(is_inside, 1)].tolist())
     if not corners:
         return points, faces
     number = np.array(corners)
@@ -556,34 +570,36 @@ def _front_sides(x: Floats, candidate: Bools, body: Body) -> tuple[Bools, list[S
     Where a front comes close to the boundary over less than two cells without leaving the body,
     it runs on; pieces shorter than a cell are no fronts.
     """
-    following = np.roll(x, -1, axis=0)
-    depth, facet = body.depth((x + following) / 2)
-    size = body.cell_size((x + following) / 2)
-    length = np.linalg.norm(following - x, axis=1)
-    inside: Bools = (depth < -_MOUTH * facet) & candidate
-    short = []
-    for value, least in ((False, OUTSIDE), (True, 1.0)):
-        for run in runs_of(inside == value):
-            if len(run) == len(inside) or length[run].sum() >= least * size[run].max():
+    next_point = np.roll(x, -1, axis=0)
+    depth, facet = body.depth((x + next_point) / 2)
+    size = body.cell_size((x + next_point) / 2)
+    length = np.linalg.norm(next_point - x, axis=1)
+    is_inside: Bools = (depth < -_MOUTH * facet) & candidate
+    short_runs = []
+    for value, least_length in ((False, OUTSIDE), (True, 1.0)):
+        for run in runs_of(is_inside == value):
+            if len(run) == len(is_inside) or length[run].sum() >= least_length * size[run].max():
                 continue
             if value:
-                place = tuple(((x + following) / 2)[run].mean(axis=0).tolist())
-                short.append(ShortFront(place, float(length[run].sum()), float(size[run].max())))
-                inside[run] = False
+                place = tuple(((x + next_point) / 2)[run].mean(axis=0).tolist())
+                short_runs.append(
+                    ShortFront(place, float(length[run].sum()), float(size[run].max()))
+                )
+                is_inside[run] = False
             elif (candidate[run] & (depth[run] < -_TOUCH * size[run])).all():
-                inside[run] = True
-    return inside, short
+                is_inside[run] = True
+    return is_inside, short_runs
 
 
 def _front_along_boundary(x: Floats, body: Body) -> list[ShortFront]:
     """What of an outline ends in the body, but nowhere half a cell from its boundary."""
     middle = (x + np.roll(x, -1, axis=0)) / 2
     depth, facet = body.depth(middle)
-    deepest = int(np.argmin(depth / facet))
-    if depth[deepest] > -_SEEN * facet[deepest]:
+    deepest_point = int(np.argmin(depth / facet))
+    if depth[deepest_point] > -_SEEN * facet[deepest_point]:
         return []
-    size = float(body.cell_size(middle[[deepest]])[0])
-    return [ShortFront(tuple(middle[deepest].tolist()), 0.0, size)]
+    size = float(body.cell_size(middle[[deepest_point]])[0])
+    return [ShortFront(tuple(middle[deepest_point].tolist()), 0.0, size)]
 
 
 def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
@@ -640,8 +656,8 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
             parts.append(part)
             owners.append(np.full(len(part), i))
     x, owner = np.concatenate(parts), np.concatenate(owners)
-    inside = body.contains(x)
-    x, owner = x[inside], owner[inside]
+    is_inside = body.contains(x)
+    x, owner = x[is_inside], owner[is_inside]
     if len(np.unique(owner)) < 2:
         return
     cell, _ = locate(body.mesh, x)
@@ -649,12 +665,14 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
     pairs = cKDTree(x).query_pairs(float(size.max()), output_type="ndarray")
     pairs = pairs[owner[pairs[:, 0]] != owner[pairs[:, 1]]]
     if any(crack.ends_on for crack in cracks):
-        apart = [not are_opposite(cracks[a], cracks[b]) for a, b in owner[pairs].tolist()]
-        pairs = pairs[np.array(apart, dtype=bool)]
+        is_apart = [not are_opposite(cracks[a], cracks[b]) for a, b in owner[pairs].tolist()]
+        pairs = pairs[np.array(is_apart, dtype=bool)]
     distance = np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
-    meets = np.array([may_touch(cracks, a, b) for a, b in owner[pairs].tolist()], dtype=bool)
-    least = size[pairs].min(axis=1) * np.where(meets, _BEFORE_FRONT, 1.0)
-    close_pairs = np.nonzero((distance < least) | (cell[pairs[:, 0]] == cell[pairs[:, 1]]))[0]
+    is_meeting = np.array([may_touch(cracks, a, b) for a, b in owner[pairs].tolist()], dtype=bool)
+    least_distance = size[pairs].min(axis=1) * np.where(is_meeting, _BEFORE_FRONT, 1.0)
+    close_pairs = np.nonzero(
+        (distance < least_distance) | (cell[pairs[:, 0]] == cell[pairs[:, 1]])
+    )[0]
     if len(close_pairs):
         k = close_pairs[np.argmin(distance[close_pairs])]
         i, j = pairs[k]
@@ -663,7 +681,7 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
                 f"the fronts of cracks {owner[i]} and {owner[j]} share the point {at(x[i])}, where "
                 "no mesh can part them: leave a few cells between, or join them to one surface."
             )
-        if meets[k]:
+        if is_meeting[k]:
             arm, on = owner[[i, j]] if cracks[owner[i]].ends_on else owner[[j, i]]
             raise CoarseMeshError(
                 f"crack {arm} comes to within {distance[k]:.4g} of the front of crack {on}, on "
@@ -689,8 +707,8 @@ def meeting_points(one: Crack, other: Crack, body: Body) -> Floats:
     for a, b in ((one, other), (other, one)):
         x = np.concatenate([a.points, a.points[a.faces].mean(axis=1)])
         size = body.cell_size(x)
-        closest = closest_in(triangle_tree(b.points, b.faces), x, _TOUCH * float(size.max()))
-        parts.append(x[(closest.triangle >= 0) & (closest.distance < _TOUCH * size)])
+        nearest_point = closest_in(triangle_tree(b.points, b.faces), x, _TOUCH * float(size.max()))
+        parts.append(x[(nearest_point.triangle >= 0) & (nearest_point.distance < _TOUCH * size)])
     points = np.concatenate(parts)
     return points[body.contains(points)]
 

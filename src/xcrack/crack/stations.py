@@ -125,9 +125,11 @@ def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
     _GEOMETRY[mesh.dim].check(cracks, mesh)
 
 
-def on_others(given: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Crack, ...]:
+def on_others(
+    given_cracks: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh
+) -> tuple[Crack, ...]:
     """Placed cracks that end on others; see `on_others` in 2D and `arms_placed` in 3D."""
-    return _GEOMETRY[mesh.dim].on_others(given, cracks, mesh)
+    return _GEOMETRY[mesh.dim].on_others(given_cracks, cracks, mesh)
 
 
 def on_mesh(crack: Crack, mesh: Mesh) -> Crack:
@@ -172,25 +174,29 @@ class Stations:
 
 def inside_body(cracks: Sequence[Crack], c: int, mesh: Mesh, x: Floats) -> Bools:
     """Which points of crack c count: in the body, and not beyond a crack on which it ends."""
-    inside = contains(mesh, x)
+    is_inside_ = contains(mesh, x)
     if cracks[c].ends_on:
-        inside = inside & is_before(cracks, c, x)
-    return np.asarray(inside)
+        is_inside_ = is_inside_ & is_before(cracks, c, x)
+    return np.asarray(is_inside_)
 
 
-def part_inside(x: Floats, inside: Ints, is_inside: Callable[[Floats], Bools]) -> tuple[int, int]:
+def part_inside(
+    x: Floats, rows_inside: Ints, is_inside: Callable[[Floats], Bools]
+) -> tuple[int, int]:
     """First vertex of an open front to count, and the one behind the last.
 
     One beyond each end of the part in the body, where that does not end at a vertex: from there a
     front is led out of the body in a direction of its own.
     """
-    if not len(inside):
+    if not len(rows_inside):
         return 0, len(x)
-    first, last = int(inside[0]), int(inside[-1])
-    ahead = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
-    on = x[[first, last]] + _ON * (x[ahead] - x[[first, last]])
+    first, last = int(rows_inside[0]), int(rows_inside[-1])
+    next_rows = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
+    on = x[[first, last]] + _ON * (x[next_rows] - x[[first, last]])
     goes_on = is_inside(on)
-    first, last = (k if beyond else end for k, end, beyond in zip(ahead, (first, last), goes_on))
+    first, last = (
+        k if is_beyond else end for k, end, is_beyond in zip(next_rows, (first, last), goes_on)
+    )
     return (first, last + 1) if last > first else (0, len(x))
 
 
@@ -212,15 +218,15 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
         else:
             for k, front in enumerate(front_frames(crack)):
                 is_inside = partial(inside_body, cracks, c, mesh)
-                within = np.nonzero(is_inside(np.array(front.x)))[0]
-                whole = front_curve(front.x, front.frame, front.closed)
+                rows_inside = np.nonzero(is_inside(np.array(front.x)))[0]
+                curve = front_curve(front.x, front.frame, front.closed)
                 first, last = 0, len(front.x)
                 if not front.closed:
-                    first, last = part_inside(front.x, within, is_inside)
+                    first, last = part_inside(front.x, rows_inside, is_inside)
                 part = front_curve(front.x[first:last], front.frame[first:last], front.closed)
-                frame = part.at(part.breaks[within - first])[1]
-                s = whole.arc(whole.breaks[within])
-                rows.append((c, k, s, front.x[within], frame))
+                frame = part.at(part.breaks[rows_inside - first])[1]
+                s = curve.arc(curve.breaks[rows_inside])
+                rows.append((c, k, s, front.x[rows_inside], frame))
     count = [len(row[2]) for row in rows]
     return Stations(
         lock(np.repeat([row[0] for row in rows], count).astype(np.int64)),

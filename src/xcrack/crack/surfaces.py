@@ -96,15 +96,15 @@ def elliptic_crack(
     >>> elliptic_crack((0, 0, 0), (0, 0, 1), (1, 0, 0), 2.0, 1.0).dim
     3
     """
-    middle, given = np.asarray(center), np.asarray(axis)
+    middle, axis_vector = np.asarray(center), np.asarray(axis)
     z = _unit(np.asarray(normal), "the normal of the elliptic crack")
-    flat = given - (given @ z) * z
-    if not np.linalg.norm(flat) > 1e-9 * np.linalg.norm(given):
+    axis_in_plane = axis_vector - (axis_vector @ z) * z
+    if not np.linalg.norm(axis_in_plane) > 1e-9 * np.linalg.norm(axis_vector):
         raise GeometryError(
-            f"the axis {given.tolist()} of the elliptic crack runs along its normal or is zero: "
-            "give the direction of the half-axis a, which lies in the plane of the crack."
+            f"the axis {axis_vector.tolist()} of the elliptic crack runs along its normal or is "
+            "zero: give the direction of the half-axis a, which lies in the plane of the crack."
         )
-    x = flat / np.linalg.norm(flat)
+    x = axis_in_plane / np.linalg.norm(axis_in_plane)
     y = np.cross(z, x)
     return _disc(middle, x * a, y * b, n)
 
@@ -136,11 +136,11 @@ def _disc(center: Floats, first: Floats, second: Floats, n: int) -> Crack:
             half = np.arange(count // 2)
             inner_now = begin + count + half
             inner_next = begin + count + (half + 1) % (count // 2)
-            even, odd = outer[::2], outer[1::2]
-            following = np.roll(even, -1)
-            faces.append(np.stack([even, odd, inner_now], axis=1))
-            faces.append(np.stack([odd, inner_next, inner_now], axis=1))
-            faces.append(np.stack([odd, following, inner_next], axis=1))
+            even_points, odd_points = outer[::2], outer[1::2]
+            next_even = np.roll(even_points, -1)
+            faces.append(np.stack([even_points, odd_points, inner_now], axis=1))
+            faces.append(np.stack([odd_points, inner_next, inner_now], axis=1))
+            faces.append(np.stack([odd_points, next_even, inner_next], axis=1))
         begin += count
     points.append(center[None])
     return Crack(np.concatenate(points), np.concatenate(faces))
@@ -150,9 +150,9 @@ def _cosine(turns: Floats) -> Floats:
     """Cosine of an angle in full turns, such that mirrored points mirror to the last bit."""
     part = np.mod(turns, 1.0)
     part = np.minimum(part, 1 - part)
-    back = part > 0.25
-    value = np.cos(2 * np.pi * np.where(back, 0.5 - part, part))
-    return np.where(part == 0.25, 0.0, np.where(back, -value, value))
+    is_second_half = part > 0.25
+    value = np.cos(2 * np.pi * np.where(is_second_half, 0.5 - part, part))
+    return np.where(part == 0.25, 0.0, np.where(is_second_half, -value, value))
 
 
 @check_arguments(GeometryError)
@@ -209,18 +209,18 @@ def plane_crack(polygon: Annotated[ArrayLike, Points((None, 3))]) -> Crack:
             f"corner {i} at {x[i].tolist()} lies {abs(height[i]):.4g} off the plane of the others; "
             f"{_FLAT * size:.4g} is allowed. Use surface_crack for a crack that is not plane."
         )
-    along = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    along = np.cross(np.cross(normal, along), normal)
-    along /= np.linalg.norm(along)
-    flat = np.stack([local @ along, local @ np.cross(normal, along)], axis=1)
-    crossing = self_crossing(flat)
+    first_axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first_axis = np.cross(np.cross(normal, first_axis), normal)
+    first_axis /= np.linalg.norm(first_axis)
+    plane_points = np.stack([local @ first_axis, local @ np.cross(normal, first_axis)], axis=1)
+    crossing = self_crossing(plane_points)
     if crossing is not None:
         i, j = crossing
         raise GeometryError(
             f"sides {i} and {j} of the plane crack meet near {at(x[j])}: give "
             "the corners in order around the crack."
         )
-    return Crack(x, ear_clipped(flat))
+    return Crack(x, ear_clipped(plane_points))
 
 
 def surface_crack(
@@ -267,20 +267,20 @@ def surface_crack(
             f"triangle {face} {faces[face].tolist()} of the surface crack names a point outside "
             f"0 ... {len(x) - 1}: points are numbered from 0."
         )
-    used, inverse = np.unique(faces, return_inverse=True)
-    x, faces = x[used], inverse.reshape(-1, 3)
+    used_points, inverse = np.unique(faces, return_inverse=True)
+    x, faces = x[used_points], inverse.reshape(-1, 3)
     if not np.isfinite(x).all():
-        face = int(used[np.argmax(~np.isfinite(x).all(axis=1))])
+        face = int(used_points[np.argmax(~np.isfinite(x).all(axis=1))])
         raise GeometryError(f"point {face} of the surface crack is not finite: give it.")
     x = point_coordinates(x, what, (None, 3), error=GeometryError)
     _check_shape(x, faces)
-    turned = oriented_faces(faces)
-    if turned is None:
+    new_faces = oriented_faces(faces)
+    if new_faces is None:
         raise GeometryError(
             "the surface crack has only one side (a Möbius strip): cut it open, so that lip + and "
             "lip - can be distinguished."
         )
-    edges, _ = rim(turned)
+    edges, _ = rim(new_faces)
     if not len(edges):
         raise GeometryError(
             f"the surface crack around {at(x.mean(axis=0))} is closed: it would "
@@ -292,18 +292,18 @@ def surface_crack(
             f"pieces of the surface crack touch at {x[int(np.argmax(starts))].tolist()} in a point "
             "only: join them along a side, or move them apart."
         )
-    return Crack(x, turned)
+    return Crack(x, new_faces)
 
 
 def _check_shape(x: Floats, faces: Ints) -> None:
     corner = x[faces]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    thin = face_areas(x, faces) <= 1e-10 * longest**2
-    if thin.any():
-        face = int(np.argmax(thin))
+    is_thin = face_areas(x, faces) <= 1e-10 * longest**2
+    if is_thin.any():
+        face = int(np.argmax(is_thin))
         raise GeometryError(
             f"triangle {face} of the surface crack at {at(corner[face][0])} has no "
-            f"area ({int(thin.sum())} such triangles): remove it or merge its points."
+            f"area ({int(is_thin.sum())} such triangles): remove it or merge its points."
         )
     key, count = np.unique(side_keys(faces), return_counts=True)
     if count.max() > 2:
@@ -348,10 +348,10 @@ def _merged_points(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
     if points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
-    used = np.unique(triangles)
-    if not (np.abs(points[used]) <= LARGEST).all():
+    used_points = np.unique(triangles)
+    if not (np.abs(points[used_points]) <= LARGEST).all():
         return points, triangles  # refused by surface_crack
-    x = points[used]
+    x = points[used_points]
     # Single precision is what a binary STL stores.
     close_pairs = cKDTree(x).query_pairs(
         1e-7 * float(np.ptp(x, axis=0).max()), output_type="ndarray"
@@ -363,7 +363,7 @@ def _merged_points(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     group = connected_components(graph, directed=False)[1]
     _, first = np.unique(group, return_index=True)
     place = np.zeros(len(points), dtype=np.int64)
-    place[used] = group
+    place[used_points] = group
     faces = place[triangles]
     is_proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return x[first], faces[is_proper]

@@ -76,9 +76,9 @@ def estimate(
     m = dual.z.shape[2]
     sets = np.unique(dual.set_number[[s.number for s in solutions]])
     columns = [np.stack([s.u for s in solutions], axis=1), *dual.z[sets]]
-    nodal = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
-    nodal = np.concatenate([nodal, np.zeros((1, *nodal.shape[1:]))])
-    residual, blocks = residuals(w, solutions[0].problem.elasticity, nodal)
+    values_at_nodes = np.concatenate(columns, axis=1).reshape(space.n_functions, 2, -1)
+    values_at_nodes = np.concatenate([values_at_nodes, np.zeros((1, *values_at_nodes.shape[1:]))])
+    residual, blocks = residuals(w, solutions[0].problem.elasticity, values_at_nodes)
     r_u, r_z = residual[:, :, : len(solutions)], residual[:, :, len(solutions) :]
     for k, solution in enumerate(solutions):
         r_u[:, :, k] += load_residual(w, solution)
@@ -92,7 +92,7 @@ def estimate(
     mus = tuple(np.zeros((len(solutions), len(lips), m)) for lips in factored.model.lips)
     eta, end = np.zeros((2, len(solutions), m))
     by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
-    parts = np.zeros((len(solutions), len(w.fixed), m))
+    parts = np.zeros((len(solutions), len(w.is_fixed), m))
     for k, solution in enumerate(solutions):
         set_number = int(dual.set_number[solution.number])
         place = int(np.searchsorted(sets, set_number)) * m

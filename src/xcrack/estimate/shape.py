@@ -275,8 +275,8 @@ def _along_normal(way: Floats, normal: Floats) -> Floats:
 def _columns(solutions: Sequence[Solution], z: Floats) -> Floats:
     """Coefficients of the states, then of their dual solutions, with a last row of zeros."""
     columns = np.concatenate([np.stack([s.u for s in solutions], axis=1), *z], axis=1)
-    nodal = columns.reshape(solutions[0].space.n_functions, 2, -1)
-    return np.concatenate([nodal, np.zeros((1, *nodal.shape[1:]))])
+    values_at_nodes = columns.reshape(solutions[0].space.n_functions, 2, -1)
+    return np.concatenate([values_at_nodes, np.zeros((1, *values_at_nodes.shape[1:]))])
 
 
 def _products(

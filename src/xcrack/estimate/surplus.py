@@ -53,7 +53,7 @@ class HierarchicalSurplus:
     sign: Floats
     copy: Ints
     crack: Ints
-    fixed: Bools
+    is_fixed: Bools
 
     @property
     def arrays(self) -> tuple[Ints, Floats, Ints, Ints, Floats]:
@@ -133,7 +133,7 @@ def residuals(
 
     space = surplus.space
     mesh = space.mesh
-    residual = np.zeros((len(surplus.fixed), 2, coefficients.shape[2]))
+    residual = np.zeros((len(surplus.is_fixed), 2, coefficients.shape[2]))
     blocks = np.zeros((len(surplus.copy), 4, 4))
     is_special = space.signature != 0
     is_special |= (surplus.copy[surplus.functions] >= 0).any(axis=1)
@@ -161,7 +161,7 @@ def goal_residual(surplus: HierarchicalSurplus, goal: Goal) -> Floats:
     from xcrack.estimate.kernels.goal import add_cells
     from xcrack.estimate.kernels.surplus import add_functional
 
-    result = np.zeros((len(surplus.fixed), 2, goal.m))
+    result = np.zeros((len(surplus.is_fixed), 2, goal.m))
     for part in goal.parts:
         at = part.at.points
         add_functional(result, at.cell, at.bary, at.side, part.factor, *surplus.arrays)
@@ -183,9 +183,9 @@ def solve_surplus(surplus: HierarchicalSurplus, blocks: Floats, residual: Floats
     copied_edges = np.nonzero(surplus.copy >= 0)[0]
     copies = surplus.copy[copied_edges]
     n = len(surplus.copy)
-    result = np.where(surplus.fixed[:, :, None], 0.0, residual)
+    result = np.where(surplus.is_fixed[:, :, None], 0.0, residual)
     a, b, c = blocks[:, 0, 0, None], blocks[:, 0, 1, None], blocks[:, 1, 1, None]
-    is_loose = surplus.fixed[:n].sum(axis=1) == 0
+    is_loose = surplus.is_fixed[:n].sum(axis=1) == 0
     x, y = result[:n, 0], result[:n, 1]
     coupling = np.where(is_loose[:, None], b, 0.0)
     determinant = a * c - coupling * coupling
@@ -193,7 +193,9 @@ def solve_surplus(surplus: HierarchicalSurplus, blocks: Floats, residual: Floats
     result[:n] /= determinant[:, None]
     if len(copied_edges):
         rhs = np.concatenate([residual[copied_edges], residual[copies]], axis=1)
-        is_fixed = np.concatenate([surplus.fixed[copied_edges], surplus.fixed[copies]], axis=1)
+        is_fixed = np.concatenate(
+            [surplus.is_fixed[copied_edges], surplus.is_fixed[copies]], axis=1
+        )
         pair_solutions = _regular_solutions(blocks[copied_edges], rhs, is_fixed)
         result[copied_edges], result[copies] = pair_solutions[:, :2], pair_solutions[:, 2:]
     return result
@@ -283,7 +285,7 @@ def load_residual(surplus: HierarchicalSurplus, solution: Solution) -> Floats:
 
     Pressures on crack faces are left out: see `face_residual`.
     """
-    result = np.zeros((len(surplus.fixed), 2))
+    result = np.zeros((len(surplus.is_fixed), 2))
     for load, factor in solution.acting:
         if "traction" in load.acts:
             _add_traction(result, surplus, load, factor)
@@ -357,7 +359,7 @@ def face_residual(surplus: HierarchicalSurplus, lips: LipPoints, pressure: Float
     pressure : (q, m) array, stress
         Positive where it opens the crack.
     """
-    result = np.zeros((len(surplus.fixed), 2, pressure.shape[1]))
+    result = np.zeros((len(surplus.is_fixed), 2, pressure.shape[1]))
     force = (lips.weight[:, None] * lips.normal)[:, :, None] * pressure[:, None]
     for s in (0, 1):  # a copy is w on face + and -w on face -, and the force turns its sign too
         cell = lips.cell[:, s]
@@ -373,8 +375,8 @@ def imposed_coefficients(surplus: HierarchicalSurplus, solution: Solution) -> Fl
 
     Displacements that are fitted beside a crack count as exact.
     """
-    result = np.zeros((len(surplus.fixed), 2))
-    is_taken = np.zeros((len(surplus.fixed), 2), dtype=bool)
+    result = np.zeros((len(surplus.is_fixed), 2))
+    is_taken = np.zeros((len(surplus.is_fixed), 2), dtype=bool)
     moved_supports = {
         str(load.place): (load, f) for load, f in solution.acting if "support" in load.acts
     }
@@ -407,7 +409,7 @@ def _impose(
 
     # Li Lj (Li - Lj) is 3/32 at Li = 3/4 and -3/32 at 1/4.
     coefficient = (rest(0.75) - rest(0.25)) / 2 * (32 / 3)
-    is_new = surplus.fixed[edge] & ~is_taken[edge] & np.isfinite(coefficient)
+    is_new = surplus.is_fixed[edge] & ~is_taken[edge] & np.isfinite(coefficient)
     result[edge] = np.where(is_new, factor * coefficient, result[edge])
     is_taken[edge] = True
 

@@ -594,7 +594,7 @@ def enriched_stiffness(
                 data, indptr, indices, batch.functions, products, space.n_nodes, *stiffness
             )  # fmt: skip
 
-    def tabulated(task: tuple[Material, Batch]) -> tuple[Material, Ints, Ints, Floats, Floats]:
+    def tabulate_batch(task: tuple[Material, Batch]) -> tuple[Material, Ints, Ints, Floats, Floats]:
         material, batch = task
         number, row, first = points.of_cells(batch.cells)
         bary, weight, side = points.bary[number], points.weight[number], points.side[number]
@@ -617,7 +617,7 @@ def enriched_stiffness(
     )
     # Few points take less time than threads to begin.
     is_one_chunk = len(points.weight) <= _CHUNK
-    tables = map(tabulated, tasks) if is_one_chunk else stream_tasks(tabulated, tasks)
+    tables = map(tabulate_batch, tasks) if is_one_chunk else stream_tasks(tabulate_batch, tasks)
     for material, functions, first, weight, G in tables:
         with one_blas_thread():
             stiffness = isotropic_part(material.unit.tensor(d))

@@ -494,7 +494,7 @@ def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
     nodes = mesh.points[mesh.cells[cell[:, 1]]]
     corners = np.einsum("lvb,lbd->lvd", bary[:, 1], nodes - nodes[:, :1])
     slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
-    normal = _GEOMETRY[mesh.dim].across(corners)
+    normal = _GEOMETRY[mesh.dim].normals_of(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.maximum(length, 1e-300)
     return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])
@@ -515,7 +515,7 @@ class _Geometry:
 
     end_parts: Callable[..., Any]
     lips_up_to_ends: Callable[..., tuple[Floats, Ints]]
-    across: Callable[[Floats], Floats]
+    normals_of: Callable[[Floats], Floats]
 
 
 _GEOMETRY = {

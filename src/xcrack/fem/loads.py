@@ -481,8 +481,8 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     A = np.zeros((len(row_ids), len(unknowns)))
     A[row_place, place] = entry[keep]
     x = position(space, points.cell, points.bary)[row_ids]
-    imposed = support.displacement_at(x)
-    target = np.nan_to_num(imposed)
+    values_there = support.displacement_at(x)
+    target = np.nan_to_num(values_there)
     # Each point counts alike: weighted by length, the data of a sliver would be cut off as noise.
     # Enriched functions take what standard ones leave, or they would take part in every field
     # where their traces are nearly those of polynomials.
@@ -491,7 +491,7 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
     scale = _scales(space)[unknowns]
     correction = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
-    is_free = np.isnan(imposed).any(axis=0)
+    is_free = np.isnan(values_there).any(axis=0)
     return unknowns, np.where(is_free, np.nan, solution + correction / scale[:, None])
 
 

@@ -43,10 +43,10 @@ def alarms_of_step(rule: GrowthRule, step: Step) -> list[Alarm]:
             alarms += alarms_of_solutions(solutions)
         if not any("in all load states" in alarm.place for alarm in alarms):
             alarms += _factors(rule) + _rate(rule, step)
-    known = step.validity if rule.K_c is None else None
-    known = known or validity_of(rule, step, rule.toughness)
-    if known is not None:
-        limits = known.alarms()
+    check = step.validity if rule.K_c is None else None
+    check = check or validity_of(rule, step, rule.toughness)
+    if check is not None:
+        limits = check.alarms()
         # Later in a run it is why growth ends.
         alarms += [a for a in limits if step.index == 0 or not a.quantity.startswith("K over")]
     return alarms
@@ -66,13 +66,16 @@ def _solutions(rule: GrowthRule, step: Step) -> tuple[Solution, ...]:
     return step.solutions if rule.response is None else ()
 
 
-def alarm_of_life(rule: GrowthRule, last: Step, ended: str) -> Alarm | None:
+def alarm_of_life(rule: GrowthRule, last: Step, end: str) -> Alarm | None:
     """A life that is too short for fatigue, in a scene with units.
 
     A run that ends at its first step has said why.
     """
-    cycles, stopped = last.cycles, ended.startswith(("max_", "rate is zero", "the advance"))
-    if stopped or last.index == 0 or not has_units(rule.problem) or cycles >= _FEW:
+    cycles, has_stopped_by_itself = (
+        last.cycles,
+        end.startswith(("max_", "rate is zero", "the advance")),
+    )
+    if has_stopped_by_itself or last.index == 0 or not has_units(rule.problem) or cycles >= _FEW:
         return None
     remedy = "is the law in the units of the model, and are the loads as meant?"
     return Alarm("the number of cycles until the run ended", cycles, _FEW, "", remedy)
@@ -114,8 +117,8 @@ def _stress_of(load: Load) -> float:
         value = getattr(load, name)
         unit = None if argument.rule is None else argument.rule.unit
         if (unit(load) if callable(unit) else unit) == STRESS and not callable(value):
-            given = np.asarray(value, dtype=object).ravel()
-            largest = max([largest, *(abs(float(v)) for v in given if v is not None)])
+            components = np.asarray(value, dtype=object).ravel()
+            largest = max([largest, *(abs(float(v)) for v in components if v is not None)])
     return largest
 
 

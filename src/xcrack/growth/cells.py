@@ -62,38 +62,38 @@ def begin(rule: GrowthRule) -> GrowthRule:
         That has more unknowns than the run may have.
     """
     mesh = _MESHES[rule.problem.mesh.dim].first_mesh(rule.problem)
-    least = mesh.dim * (mesh.n_points + len(mesh.edges))
-    if rule.max_unknowns is not None and least > rule.max_unknowns:
+    least_unknowns = mesh.dim * (mesh.n_points + len(mesh.edges))
+    if rule.max_unknowns is not None and least_unknowns > rule.max_unknowns:
         raise ProblemError(
             f"grow: max_unknowns = {rule.max_unknowns}, and the first mesh, on which cracks are a "
-            f"few cells long, has {least} at least: allow more, or give a coarser mesh."
+            f"few cells long, has {least_unknowns} at least: allow more, or give a coarser mesh."
         )
     return replace(rule, problem=replace(rule.problem, mesh=mesh, order=2))
 
 
-def at_step(begun: GrowthRule, state: RunState) -> GrowthRule:
+def at_step(first_rule: GrowthRule, state: RunState) -> GrowthRule:
     """A run on the mesh of one of its steps."""
-    return _with_cells(begun, state.cells, state.meshes)
+    return _with_cells(first_rule, state.cells, state.meshes)
 
 
-def bisected(mesh: Mesh, cells: CellSizes) -> Mesh:
+def bisect_mesh(mesh: Mesh, cells: CellSizes) -> Mesh:
     """A mesh in cells of sizes that grow with the distance from some places."""
     return refine(mesh, size=graded_sizes([cells.x], [cells.size]))
 
 
-def _with_cells(begun: GrowthRule, cells: CellSizes | None, meshes: int) -> GrowthRule:
+def _with_cells(first_rule: GrowthRule, cells: CellSizes | None, meshes: int) -> GrowthRule:
     if cells is not None:
-        mesh = bisected(begun.problem.mesh, cells)
-        begun = replace(begun, problem=replace(begun.problem, mesh=mesh))
-    return replace(begun, cells=cells, meshes=meshes)
+        mesh = bisect_mesh(first_rule.problem.mesh, cells)
+        first_rule = replace(first_rule, problem=replace(first_rule.problem, mesh=mesh))
+    return replace(first_rule, cells=cells, meshes=meshes)
 
 
-def follow(begun: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
+def follow(first_rule: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
     """The run on the mesh of the next step, whose ends are where the plan of the last one leads.
 
     Parameters
     ----------
-    begun, rule : GrowthRule
+    first_rule, rule : GrowthRule
         On the mesh that it begins with, and on that of the last step.
     last : Step
     """
@@ -109,7 +109,7 @@ def follow(begun: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
     size = cells.size_at(x)
     if (cell_sizes(rule.problem.mesh, x) <= _LARGER * size).all():
         return rule
-    return _with_cells(begun, cells.with_ends(x, size), rule.meshes)
+    return _with_cells(first_rule, cells.with_ends(x, size), rule.meshes)
 
 
 def _first_mesh_2d(problem: Problem) -> Mesh:
@@ -129,44 +129,46 @@ _FORETOLD = 4.0  # times the wanted bar: from there the next mesh need not be lo
 _MOST_UNKNOWNS = 300_000
 
 
-def finer(begun: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
+def refine_cells(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
     """The run on a mesh on which the bars of K at a step are as wanted, or nearly so.
 
     Parameters
     ----------
-    begun, rule : GrowthRule
+    first_rule, rule : GrowthRule
         On the mesh that it begins with, and on that of the step.
     step : Step
     """
     dimension, start = _MESHES[rule.problem.mesh.dim], perf_counter()
-    most = rule.max_unknowns or _MOST_UNKNOWNS
+    most_unknowns = rule.max_unknowns or _MOST_UNKNOWNS
     tolerance = float(rule.tolerance or 0.0)
     exponent = law_exponent(rule.law, np.concatenate(step.dK_eq), np.concatenate(step.R))
     target = SHARE / TOGETHER * tolerance / max(exponent, _LEAST_EXPONENT)
     meshes = rule.meshes + 1
     for number in range(dimension.rounds):
-        now = _bars_of_cracks(rule, step)
-        if now is None:
+        indicators = _bars_of_cracks(rule, step)
+        if indicators is None:
             break
-        error, unknowns = dimension.error(now), now.solutions[0].space.n_dof
+        error, unknowns = dimension.error(indicators), indicators.solutions[0].space.n_dof
         _tell(
             rule, f"mesh {number}: {unknowns} unknowns, K within {error:.1e}, wanted {target:.1e}",
             start,
         )  # fmt: skip
         if error <= target:
             break
-        other = _with_cells(begun, dimension.cells(rule.cells, now, target * now.scale), meshes)
-        before, after = len(rule.problem.mesh.cells), len(other.problem.mesh.cells)
-        if unknowns * after > most * before:
+        other = _with_cells(
+            first_rule, dimension.cells(rule.cells, indicators, target * indicators.scale), meshes
+        )
+        n_cells_before, n_cells_after = len(rule.problem.mesh.cells), len(other.problem.mesh.cells)
+        if unknowns * n_cells_after > most_unknowns * n_cells_before:
             warn(
                 f"grow: the mesh that tolerance = {tolerance:g} asks for would have more than "
-                f"{most} unknowns: growth goes on with {unknowns}, on which K is known to "
+                f"{most_unknowns} unknowns: growth goes on with {unknowns}, on which K is known to "
                 f"{error:.1e} of its largest value, where {target:.1e} was wanted. Allow more with "
                 "max_unknowns; life_bar says what it costs."
             )
             return replace(rule, meshes=_MOST)
         rule = other
-        if error <= _FORETOLD * target or after == before:
+        if error <= _FORETOLD * target or n_cells_after == n_cells_before:
             break
     return replace(rule, meshes=meshes)
 
@@ -191,22 +193,26 @@ _SMALLER = 0.85  # ratio of sizes from which on a cell is worth a place
 _AT_TIP, _AT_KINK = 4.0, 2.0  # cells: what belongs to a tip and moves with it, to a kink and stays
 
 
-def _error_2d(now: Indicators) -> float:
+def _error_2d(indicators: Indicators) -> float:
     """Largest half-width of K over the largest K, of those that are known."""
-    scale = now.scale_of(now.K[np.isfinite(now.K)])
-    return float(now.bar[np.isfinite(now.bar)].max(initial=0.0)) / scale if scale > 0 else 0.0
+    scale = indicators.scale_of(indicators.K[np.isfinite(indicators.K)])
+    return (
+        float(indicators.bar[np.isfinite(indicators.bar)].max(initial=0.0)) / scale
+        if scale > 0
+        else 0.0
+    )
 
 
-def _cells_2d(cells: CellSizes | None, now: Indicators, target: float) -> CellSizes:
+def _cells_2d(cells: CellSizes | None, indicators: Indicators, target: float) -> CellSizes:
     """Sizes at the tips and at other cells that contribute much to the bars."""
-    mesh, tips = now.problem.mesh, now.problem.stations.x
-    ratio = cell_ratios(now, target, _AIM)
+    mesh, tips = indicators.problem.mesh, indicators.problem.stations.x
+    ratio = cell_ratios(indicators, target, _AIM)
     centre, target_size = mesh.points[mesh.cells].mean(axis=1), ratio * mesh.cell_size
     is_smaller = ratio < _SMALLER
     size = cell_sizes(mesh, tips)
     distance = np.linalg.norm(centre[:, None] - tips, axis=2)
     is_at_tip = distance <= _AT_TIP * size
-    bends = [crack.points[kink_numbers(crack.points)] for crack in now.problem.placed]
+    bends = [crack.points[kink_numbers(crack.points)] for crack in indicators.problem.placed]
     kinks = np.concatenate([np.zeros((0, 2)), *bends])
     from_kinks = np.linalg.norm(centre[:, None] - kinks, axis=2)
     is_at_kink = (from_kinks <= _AT_KINK * cell_sizes(mesh, kinks)).any(axis=1)
@@ -215,33 +221,37 @@ def _cells_2d(cells: CellSizes | None, now: Indicators, target: float) -> CellSi
         size = np.minimum(size, cells.size_at(tips))
     for k, is_of_tip in enumerate((is_at_tip & is_smaller[:, None]).T):
         size[k] = min(size[k], target_size[is_of_tip].min(initial=np.inf))
-    stays = is_smaller & ~is_at_tip.any(axis=1)
-    fixed = CellSizes(centre[stays], target_size[stays], np.zeros(int(stays.sum()), dtype=bool))
-    return (fixed if cells is None else cells.with_places(fixed)).with_ends(tips, size)
+    is_staying = is_smaller & ~is_at_tip.any(axis=1)
+    cells_that_stay = CellSizes(
+        centre[is_staying], target_size[is_staying], np.zeros(int(is_staying.sum()), dtype=bool)
+    )
+    return (cells_that_stay if cells is None else cells.with_places(cells_that_stay)).with_ends(
+        tips, size
+    )
 
 
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
 _FINER = 1.6  # times finer in a round
 
 
-def _error_3d(now: Indicators) -> float:
+def _error_3d(indicators: Indicators) -> float:
     """Mean half-width of K along the fronts of all states, over the largest K."""
-    good = np.isfinite(now.bar).all(axis=1)
-    scale = now.scale_of(now.K[good])
-    return float(now.bar[good].max(axis=1).mean()) / scale if scale > 0 else 0.0
+    is_finite = np.isfinite(indicators.bar).all(axis=1)
+    scale = indicators.scale_of(indicators.K[is_finite])
+    return float(indicators.bar[is_finite].max(axis=1).mean()) / scale if scale > 0 else 0.0
 
 
-def _cells_3d(cells: CellSizes | None, now: Indicators, target: float) -> CellSizes:
+def _cells_3d(cells: CellSizes | None, indicators: Indicators, target: float) -> CellSizes:
     """Sizes along the fronts, each as much smaller as the mean of the bars asks for."""
-    stations, mesh = now.problem.stations, now.problem.mesh
-    over = _error_3d(now) * now.scale / target if target > 0 else 1.0
+    stations, mesh = indicators.problem.stations, indicators.problem.mesh
+    excess = _error_3d(indicators) * indicators.scale / target if target > 0 else 1.0
     size = np.array(cell_sizes(mesh, stations.x))
     for crack in np.unique(stations.crack):
         is_of_crack = stations.crack == crack
         size[is_of_crack] = np.median(size[is_of_crack])
-    size /= np.clip(over, 1.0, _FINER**_POWER) ** (1 / _POWER)
-    none = CellSizes(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
-    return (none if cells is None else cells).with_ends(stations.x, size)
+    size /= np.clip(excess, 1.0, _FINER**_POWER) ** (1 / _POWER)
+    no_cells = CellSizes(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
+    return (no_cells if cells is None else cells).with_ends(stations.x, size)
 
 
 @dataclass(frozen=True)
@@ -275,8 +285,8 @@ _LAST = 0.1  # of the cycles so far: what the rest may take at the present rate
 _SHORT = 1.3  # times a first step: the shortest that cells at kinks may allow
 
 
-def replanned(
-    begun: GrowthRule, rule: GrowthRule, last: Step | None, step: Step
+def plan_again(
+    first_rule: GrowthRule, rule: GrowthRule, last: Step | None, step: Step
 ) -> tuple[GrowthRule, Step | None] | None:
     """The run and the step from which one is to be computed again; None where that is good.
 
@@ -284,27 +294,27 @@ def replanned(
 
     Parameters
     ----------
-    begun, rule : GrowthRule
+    first_rule, rule : GrowthRule
         On the mesh that it begins with, and on that of the step.
     last : Step or None
         The one before, which is handed over.
     step : Step
     """
-    other = _finer_at_kinks(begun, rule, step) if last is None else None
+    other = _finer_at_kinks(first_rule, rule, step) if last is None else None
     if other is not None:
         return other, None
-    shorter = None if last is None else _step_before(last, step)
-    if shorter is not None:  # what the mesh leaves to be wished is seen on a step that stays
-        return rule, shorter
+    shorter_step = None if last is None else _step_before(last, step)
+    if shorter_step is not None:  # what the mesh leaves to be wished is seen on a step that stays
+        return rule, shorter_step
     if not _is_mesh_too_coarse(rule, last, step):
         return None
     cells = _cells_for_room(rule, last) if _has_no_bar(step) else None
     if cells is not None:
-        other = _with_cells(begun, cells, rule.meshes + 1)
+        other = _with_cells(first_rule, cells, rule.meshes + 1)
     elif _ends_soon(rule, step):
         return None
     else:
-        other = finer(begun, rule, step)
+        other = refine_cells(first_rule, rule, step)
     return other, last if last is None else _with_room(rule, other, last, step)
 
 
@@ -341,7 +351,7 @@ def _has_no_bar(step: Step) -> bool:
     return step.error is not None and bool(np.isnan(step.error.rate))
 
 
-def _finer_at_kinks(begun: GrowthRule, rule: GrowthRule, first: Step) -> GrowthRule | None:
+def _finer_at_kinks(first_rule: GrowthRule, rule: GrowthRule, first: Step) -> GrowthRule | None:
     """Finer cells at tips that kink at once, for a first step that a tolerance asks for.
 
     None where that step has room.
@@ -355,7 +365,7 @@ def _finer_at_kinks(begun: GrowthRule, rule: GrowthRule, first: Step) -> GrowthR
         return None
     sizes = np.array([cell_for(length, angle) for angle in np.concatenate(first.angle).tolist()])
     stay = np.zeros(len(sizes), dtype=bool)
-    return _with_cells(begun, CellSizes(stations.x, sizes, stay), rule.meshes + 1)
+    return _with_cells(first_rule, CellSizes(stations.x, sizes, stay), rule.meshes + 1)
 
 
 def _cells_for_room(rule: GrowthRule, last: Step | None) -> CellSizes | None:
@@ -379,11 +389,11 @@ def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool
     error = step.error
     if not rule.estimates or error is None or not step.n_tips or rule.meshes >= _MOST:
         return False
-    before = 0 if last is None else run_state(last).meshes
-    if rule.meshes > before or (rule.meshes and step.index < _SETTLED):
+    meshes_before = 0 if last is None else run_state(last).meshes
+    if rule.meshes > meshes_before or (rule.meshes and step.index < _SETTLED):
         return False  # it was made for this step, or for a kink just behind it
     tolerance = float(rule.tolerance or 0.0)
-    forgiven = 1.0 if rule.meshes == 0 else _FORGIVEN
+    forgiven_factor = 1.0 if rule.meshes == 0 else _FORGIVEN
     rate, turn = _errors_of_step(rule, step)
     if rule.meshes and _has_no_bar(step) and _cells_for_room(rule, last) is None:
         return False
@@ -400,8 +410,8 @@ def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool
     short_of_life = (error.K + error.contact + error.unknown) / cycles > of_life
     short_of_path = error.K_place / way > _SHORT_OF_PATH * tolerance
     return bool(
-        (rate > forgiven * of_life and short_of_life and life / cycles > _WHOLE * tolerance)
-        or (turn > forgiven * of_path and short_of_path and path / way > _WHOLE * tolerance)
+        (rate > forgiven_factor * of_life and short_of_life and life / cycles > _WHOLE * tolerance)
+        or (turn > forgiven_factor * of_path and short_of_path and path / way > _WHOLE * tolerance)
         or (rule.meshes == 0 and _has_no_room(last, step))
     )
 
@@ -455,11 +465,11 @@ def _with_room(rule: GrowthRule, other: GrowthRule, last: Step, step: Step) -> S
     places = np.concatenate([sif.x for sif in step.sif[0]])
     sizes = [cell_sizes(each.problem.mesh, places) for each in (rule, other)]
     control, error = last.control, step.control.error
-    least = control.least * min(float(np.median(sizes[1] / sizes[0])), 1.0)
+    least_length = control.least * min(float(np.median(sizes[1] / sizes[0])), 1.0)
     length = control.length
     if error is not None and error > REJECTED:
-        length = next_length(length, error, None, least)
-    return replace(last, control=replace(control, length=length, least=least))
+        length = next_length(length, error, None, least_length)
+    return replace(last, control=replace(control, length=length, least=least_length))
 
 
 __all__ = [
@@ -467,8 +477,8 @@ __all__ = [
     "at_step",
     "bars_are_foretold",
     "begin",
-    "bisected",
-    "finer",
+    "bisect_mesh",
     "follow",
-    "replanned",
+    "plan_again",
+    "refine_cells",
 ]

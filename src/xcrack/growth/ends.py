@@ -59,15 +59,15 @@ def ligaments(rule: GrowthRule, step: Step) -> list[Ligament]:
     """
     tips = [(c, j) for c in range(len(step.cracks)) for j in range(len(step.sif[0][c].x))]
     x = np.array([step.sif[0][c].x[j] for c, j in tips]).reshape(-1, 2)
-    ahead = np.array([growth_directions(step, c)[j] for c, j in tips]).reshape(-1, 2)
+    directions = np.array([growth_directions(step, c)[j] for c, j in tips]).reshape(-1, 2)
     result = []
     for i, tip in enumerate(tips):
-        met = ahead_of(x[i], ahead[i], tip[0], step.cracks, rule.problem.mesh)
-        if met is not None:
-            result.append(Ligament(met.length, tip, None, met.label))
+        obstacle = ahead_of(x[i], directions[i], tip[0], step.cracks, rule.problem.mesh)
+        if obstacle is not None:
+            result.append(Ligament(obstacle.length, tip, None, obstacle.label))
         for k in range(i):
             gap = x[k] - x[i]
-            if gap @ ahead[i] > 0 > gap @ ahead[k]:
+            if gap @ directions[i] > 0 > gap @ directions[k]:
                 result.append(Ligament(float(np.linalg.norm(gap)), tip, tips[k], ""))
     return result
 
@@ -79,10 +79,10 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     from memory);
     the zone of one tip fills what lies ahead of it.
     """
-    filled = _filled_shares(rule, step)
-    if not filled:
+    filled_shares = _filled_shares(rule, step)
+    if not filled_shares:
         return ""
-    share, one = max(filled, key=lambda each: each[0])
+    share, one = max(filled_shares, key=lambda each: each[0])
     if share < 1:
         return ""
     zone = [_zones(rule, step, c) for c in range(len(step.cracks))]
@@ -171,12 +171,12 @@ def interface_is_passed(rule: GrowthRule, step: Step) -> str:
     if not rule.stop_at_interface or len(elasticity.named) < 2:
         return ""
     start = stations_of(rule.problem.placed, rule.problem.mesh).x
-    known = set(elasticity.names_at(start).tolist())
+    start_names = set(elasticity.names_at(start).tolist())
     for c in range(len(step.cracks)):
         names = elasticity.names_at(step.sif[0][c].x)
         for j, name in enumerate(names.tolist()):
-            if name not in known:
-                words = " and ".join(map(repr, sorted(known)))
+            if name not in start_names:
+                words = " and ".join(map(repr, sorted(start_names)))
                 place = place_name(step, c, j)
                 return f"interface passed: {place} has come from {words} into {name!r}"
     return ""
@@ -285,13 +285,13 @@ _FAR, _HALVINGS = 1.0, 40  # of the logarithm of a range
 WITHIN: tuple[Callable[[GrowthRule, Step], float], ...] = (cycles_beyond, K_beyond, zones_beyond)
 
 
-def beyond_end(rule: GrowthRule, step: Step, breaks: bool) -> float:
+def beyond_end(rule: GrowthRule, step: Step, is_break: bool) -> float:
     """How far a step is beyond the first of these ends: 0 is there, negative before.
 
-    `breaks` says that the law returns inf within the step: elsewhere it is not asked.
+    `is_break` says that the law returns inf within the step: elsewhere it is not asked.
     """
-    ends = (*WITHIN, law_beyond) if breaks else WITHIN
-    return max(beyond(rule, step) for beyond in ends)
+    ends = (*WITHIN, law_beyond) if is_break else WITHIN
+    return max(end_rule(rule, step) for end_rule in ends)
 
 
 def _same_states(step: Step) -> str:
@@ -348,17 +348,17 @@ def driving_place(step: Step) -> tuple[int, int]:
     """Crack and number of the solved station that is nearest to the one that drives the plan."""
     stations, row = solves_of(step)[0], plan_of(step).tip
     c = int(stations.crack[row])
-    away = np.linalg.norm(step.sif[0][c].x - stations.x[row], axis=1)
-    return c, int(np.argmin(away))
+    distance = np.linalg.norm(step.sif[0][c].x - stations.x[row], axis=1)
+    return c, int(np.argmin(distance))
 
 
 def short_kink(rule: GrowthRule, step: Step) -> str:
     """What to warn of where the fastest tip turns within one cell; empty where it does not."""
     c, j = driving_place(step)
     da, angle = step.da[c][j], step.angle[c][j]
-    ahead = growth_directions(step, c)[[j]]
-    middle = step.sif[0][c].x[[j]] + 0.5 * da * ahead
-    extent = float(cell_extents(rule.problem.mesh, middle, ahead)[0])
+    direction = growth_directions(step, c)[[j]]
+    middle = step.sif[0][c].x[[j]] + 0.5 * da * direction
+    extent = float(cell_extents(rule.problem.mesh, middle, direction)[0])
     if da >= extent or abs(angle) <= _TURN:
         return ""
     place = place_name(step, c, j)

@@ -43,24 +43,24 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     mesh = rule.problem.mesh
     cell = cell_sizes(mesh, stations.x)
     rate = np.concatenate([np.zeros(0), *step.rate])
-    fastest = float(rate.max(initial=0.0))
+    fastest_rate = float(rate.max(initial=0.0))
     plan = Plan.at_rest(step, cell)
-    if fastest == 0 or np.isinf(fastest):
+    if fastest_rate == 0 or np.isinf(fastest_rate):
         return plan
-    by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
+    by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest_rate
     largest = float(min(longest(rule, step.control), by_cycles))
     score = _score(rule, step)
     growth = stations.growth(score, largest)
-    goes = growth >= _WAITS_BELOW[mesh.dim] * cell
-    way = np.where(goes, growth, 0.0)
-    ahead = interfaces_ahead if mesh.dim == 2 else whole_front_ahead
-    near = ahead(rule, stations.x, way[:, None] * solves.direction[-1])
-    if near is not None and (way > near.stop).any():  # a step ends before it, or behind
-        reaches = way > near.stop
-        largest *= float((near.goal[reaches] / way[reaches]).min())
+    is_growing = growth >= _WAITS_BELOW[mesh.dim] * cell
+    way = np.where(is_growing, growth, 0.0)
+    find_interfaces = interfaces_ahead if mesh.dim == 2 else whole_front_ahead
+    interfaces = find_interfaces(rule, stations.x, way[:, None] * solves.direction[-1])
+    if interfaces is not None and (way > interfaces.stop).any():  # a step ends before it, or behind
+        is_beyond = way > interfaces.stop
+        largest *= float((interfaces.goal[is_beyond] / way[is_beyond]).min())
         growth = stations.growth(score, largest)
-        goes = growth >= _WAITS_BELOW[mesh.dim] * cell
-        way = np.where(goes, growth, 0.0)
+        is_growing = growth >= _WAITS_BELOW[mesh.dim] * cell
+        way = np.where(is_growing, growth, 0.0)
     row = int(np.argmax(score))
     plan = replace(
         plan,
@@ -68,7 +68,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         cycles=largest / float(rate[row]),
         arc=way,
         move=way[:, None] * solves.direction[-1],
-        moves=goes,
+        moves=is_growing,
         tip=row,
         largest=largest,
     )
@@ -92,8 +92,8 @@ def advanced_cracks(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     cracks = [advance(crack, angle[r], way[r]) for crack, r in zip(step.cracks, rows, strict=True)]
     if rule.link_up is not None:
         return cracks
-    now = [meeting for meeting in meetings(cracks, mesh) if meeting.soon]
-    return joined(cracks, (way > 0).tolist(), now) if now else cracks
+    meetings_now = [meeting for meeting in meetings(cracks, mesh) if meeting.is_soon]
+    return joined(cracks, (way > 0).tolist(), meetings_now) if meetings_now else cracks
 
 
 def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
@@ -133,24 +133,24 @@ def begin_at(
 def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """What the cracks after an advance mean for the cycles and for the next advance."""
     follow = _followed_2d if rates.problem.mesh.dim == 2 else _followed_3d
-    since, waits = follow(rule, last, rates)
-    return _step_of_solve(rule, rates, identities, last.cycles + since, waits)
+    since, growth_owed = follow(rule, last, rates)
+    return _step_of_solve(rule, rates, identities, last.cycles + since, growth_owed)
 
 
 def _step_of_solve(
-    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, waits: Floats
+    rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, growth_owed: Floats
 ) -> Corrected:
     at, n = rates.stations, len(rates.stations)
-    closed, length = np.zeros(n, dtype=bool), np.zeros(n)
+    is_closed, length = np.zeros(n, dtype=bool), np.zeros(n)
     if rates.problem.mesh.dim == 3:
         for c, crack in enumerate(rates.cracks):
             rows = at.crack == c
-            closed[rows] = np.array(closed_fronts(crack), dtype=bool)[at.front[rows]]
+            is_closed[rows] = np.array(closed_fronts(crack), dtype=bool)[at.front[rows]]
             length[rows] = front_lengths(crack)[at.front[rows]]
     direction = directions(at.frame, rates.angle)
     stations = GrowthStations(
-        at.crack, at.front, at.s, at.x, at.frame, identities.of(at), closed, length,
-        waits[:, None] * direction, np.zeros(n, dtype=bool),
+        at.crack, at.front, at.s, at.x, at.frame, identities.of(at), is_closed, length,
+        growth_owed[:, None] * direction, np.zeros(n, dtype=bool),
     )  # fmt: skip
     solves = SolveHistory(
         np.zeros(1), rates.law_rate[None], rates.dK_eq[None], direction[None],
@@ -159,10 +159,10 @@ def _step_of_solve(
     return Corrected(cycles, rates.cracks, stations, solves)
 
 
-def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
+def cycles_until(rule: GrowthRule, step: Step, part: float, end_rate: float | None) -> float:
     """Cycles of a part of the advance after a step, in proportion to it."""
     del rule
-    return part * (plan_of(step).cycles if after is None else after)
+    return part * (plan_of(step).cycles if end_rate is None else end_rate)
 
 
 # Cycles of a step, by the local power law of what drives it, and growth that goes on waiting.
@@ -175,48 +175,48 @@ def _followed_2d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
     places are recognised; one that has left the body has no rate.
     """
     stations, solves = solves_of(last)
-    moved = np.concatenate([moved_places(last, c) for c in range(len(last.cracks))])
-    row = _rows_after(moved, rates.stations.x)
-    there = row >= 0
-    waits = np.zeros(len(rates.stations))
-    waits[row[there]] = _rest(rule, last)[there]
+    moved_x = np.concatenate([moved_places(last, c) for c in range(len(last.cracks))])
+    row = _rows_after(moved_x, rates.stations.x)
+    has_row = row >= 0
+    growth_owed = np.zeros(len(rates.stations))
+    growth_owed[row[has_row]] = _rest(rule, last)[has_row]
     rate0, da = solves.rate[-1], np.concatenate(last.da)
-    goes = (da > 0) & (rate0 > 0)
-    stay = goes & there
-    choice = stay if stay.any() else goes
+    is_growing = (da > 0) & (rate0 > 0)
+    stay = is_growing & has_row
+    choice = stay if stay.any() else is_growing
     j = int(np.argmax(np.where(choice, rate0, -1.0)))
-    if not there[j]:
-        return float(da[j] / rate0[j]), waits
-    near = interfaces_ahead(rule, stations.x, plan_of(last).move)
-    if near is not None and da[j] > near.way[j]:
-        return _cycles_across(rule, last, rates, near, j, int(row[j])), waits
+    if not has_row[j]:
+        return float(da[j] / rate0[j]), growth_owed
+    interfaces = interfaces_ahead(rule, stations.x, plan_of(last).move)
+    if interfaces is not None and da[j] > interfaces.way[j]:
+        return _cycles_across(rule, last, rates, interfaces, j, int(row[j])), growth_owed
     c = int(stations.crack[j])
     a = last.sizes[c] * float(da[j] / da[stations.crack == c].sum())
-    return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), waits
+    return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), growth_owed
 
 
 def _cycles_across(
-    rule: GrowthRule, last: Step, rates: Rates, near: InterfacesAhead, j: int, row: int
+    rule: GrowthRule, last: Step, rates: Rates, interfaces: InterfacesAhead, j: int, row: int
 ) -> float:
     """Cycles of a step in which the driving tip j has passed an interface; `row` is it behind."""
-    solves, way = solves_of(last)[1], float(near.way[j])
-    behind = float(plan_of(last).arc[j]) - way
+    solves, way = solves_of(last)[1], float(interfaces.way[j])
+    way_behind = float(plan_of(last).arc[j]) - way
     begin, end = float(solves.rate[-1, j]), float(rates.law_rate[row])
     if not 0 < end < np.inf:  # the run ends there
-        cycles = np.array([way, behind]) / begin
-    elif near.is_smooth[j]:
+        cycles = np.array([way, way_behind]) / begin
+    elif interfaces.is_smooth[j]:
         sets = np.array(rule.problem.elasticity.sets_at(rates.stations.x))
-        sets[row] = near.before[j]
-        here = rates_by_law_of(rule, rates.problem, rates.response, sets)[row]
-        there = rates_behind(rule, last, near)[j]
-        rate = np.array([[begin, here], [there, end]])
-        cycles = cycles_across(float(solves.scale[j]), way, behind, *rate)
+        sets[row] = interfaces.before[j]
+        rate_here = rates_by_law_of(rule, rates.problem, rates.response, sets)[row]
+        rate_there = rates_behind(rule, last, interfaces)[j]
+        rate = np.array([[begin, rate_here], [rate_there, end]])
+        cycles = cycles_across(float(solves.scale[j]), way, way_behind, *rate)
     else:
-        exponent, power = rates.exponent(rule.law), float(near.power[j])
-        cycles = np.array(cycles_of_jump(solves, exponent, end, j, way, behind, power))
-    at = np.full(len(near.way), np.nan)
+        exponent, power = rates.exponent(rule.law), float(interfaces.power[j])
+        cycles = np.array(cycles_of_jump(solves, exponent, end, j, way, way_behind, power))
+    at = np.full(len(interfaces.way), np.nan)
     at[j] = cycles[0]
-    warn_of_passages(rule, last, near, at)
+    warn_of_passages(rule, last, interfaces, at)
     return float(cycles.sum())
 
 
@@ -232,11 +232,11 @@ def _rest(rule: GrowthRule, last: Step) -> Floats:
     return np.where(plan.moves, 0.0, solves_of(last)[0].growth(_score(rule, last), plan.length))
 
 
-def _rows_after(moved: Floats, tips: Floats) -> Ints:
+def _rows_after(moved_x: Floats, tips: Floats) -> Ints:
     """Row of each tip after the step, -1 where it has left the body."""
-    if not len(tips) or not len(moved):
-        return np.full(len(moved), -1)
-    distance, row = cKDTree(tips).query(moved)
+    if not len(tips) or not len(moved_x):
+        return np.full(len(moved_x), -1)
+    distance, row = cKDTree(tips).query(moved_x)
     return np.where(distance <= _SAME * np.abs(tips).max(), row, -1)
 
 
@@ -244,28 +244,28 @@ def _followed_3d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
     """Cycles since the last step, and the growth that waits at the places of this one."""
     stations, mesh = solves_of(last)[0], rates.problem.mesh
     rest = _rest(rule, last)
-    after: list[Floats] = []
-    waits: list[Floats] = []
+    rates_after: list[Floats] = []
+    growth_owed: list[Floats] = []
     for c, crack in enumerate(rates.cracks):
-        new, moved = rates.sif[0][c], moved_places(last, c)
-        reach = fronts.REACH * float(cell_sizes(mesh, new.x).mean() if len(new.x) else 0.0)
-        is_of_crack, closed = rates.stations.crack == c, closed_fronts(crack)
-        after.append(
+        new_sif, moved_x = rates.sif[0][c], moved_places(last, c)
+        reach = fronts.REACH * float(cell_sizes(mesh, new_sif.x).mean() if len(new_sif.x) else 0.0)
+        is_of_crack, is_closed = rates.stations.crack == c, closed_fronts(crack)
+        rates_after.append(
             interpolate_along_front(
-                new.x, new.front, closed, rates.law_rate[is_of_crack], moved, reach
+                new_sif.x, new_sif.front, is_closed, rates.law_rate[is_of_crack], moved_x, reach
             )
         )
-        old, shut = last.sif[0][c], closed_fronts(last.cracks[c])
-        near = interpolate_along_front(
-            moved, old.front, shut, rest[stations.crack == c], new.x, reach
+        old_sif, is_closed_before = last.sif[0][c], closed_fronts(last.cracks[c])
+        growth_nearby = interpolate_along_front(
+            moved_x, old_sif.front, is_closed_before, rest[stations.crack == c], new_sif.x, reach
         )
-        waits.append(np.nan_to_num(near))
-    across = fronts.cycles_of_passage(rule, last, rates)
-    if across is not None:
-        return across, np.concatenate(waits)
+        growth_owed.append(np.nan_to_num(growth_nearby))
+    cycles_across = fronts.cycles_of_passage(rule, last, rates)
+    if cycles_across is not None:
+        return cycles_across, np.concatenate(growth_owed)
     sizes = (last.sizes, rates.problem.sizes)
-    cycles = elapsed_3d(*sizes, last.da, last.law_rate, after)
-    return cycles, np.concatenate(waits)
+    cycles = elapsed_3d(*sizes, last.da, last.law_rate, rates_after)
+    return cycles, np.concatenate(growth_owed)
 
 
 def elapsed_3d(
@@ -297,20 +297,20 @@ def elapsed_3d(
     of all points of the crack which grow at least half as fast, so that the scatter of K from
     point to point averages out.
     """
-    moved = [(d > 0) & (r > 0) for d, r in zip(da, rate0)]
-    stay = [m & ~np.isnan(r) for m, r in zip(moved, rate1)]
-    there = any(m.any() for m in stay)
-    largest = [float(r[m].max(initial=-1.0)) for r, m in zip(rate0, stay if there else moved)]
+    is_moved = [(d > 0) & (r > 0) for d, r in zip(da, rate0)]
+    stay = [m & ~np.isnan(r) for m, r in zip(is_moved, rate1)]
+    has_rate = any(m.any() for m in stay)
+    largest = [float(r[m].max(initial=-1.0)) for r, m in zip(rate0, stay if has_rate else is_moved)]
     c = int(np.argmax(largest))
-    driving = (stay if there else moved)[c] & (rate0[c] >= largest[c])
+    driving = (stay if has_rate else is_moved)[c] & (rate0[c] >= largest[c])
     j = int(np.argmax(driving))
     by_first_rate = float(da[c][j] / rate0[c][j])
-    if not there:
+    if not has_rate:
         return by_first_rate
-    fast = stay[c] & (rate0[c] >= _DRIVING * largest[c])
-    if np.isinf(rate1[c][fast]).any():
+    is_fast = stay[c] & (rate0[c] >= _DRIVING * largest[c])
+    if np.isinf(rate1[c][is_fast]).any():
         return 0.5 * by_first_rate  # as in `cycles_between`
-    ratio = float(rate1[c][fast].sum() / rate0[c][fast].sum())
+    ratio = float(rate1[c][is_fast].sum() / rate0[c][is_fast].sum())
     if ratio == 0:
         return 2 * by_first_rate
     x, y = np.log(size1[c] / size0[c]), np.log(ratio)

@@ -57,8 +57,8 @@ def joins_of(step: Step, problem: Problem) -> tuple[Join, ...]:
     plan = plan_of(step)
     N, index = step.cycles + plan.cycles, step.index + 1
     if problem.mesh.dim == 3:
-        behind = _behind_holes(step, plan.cracks, problem)
-        return (*(Join(index, N, x, (c, c)) for c, x in behind), *plan.joins)
+        joins_at_holes = _behind_holes(step, plan.cracks, problem)
+        return (*(Join(index, N, x, (c, c)) for c, x in joins_at_holes), *plan.joins)
     ends = new_ends(step.corrected, problem.placed)
     unions = new_unions(step.corrected, problem.placed)
     return tuple(
@@ -68,33 +68,37 @@ def joins_of(step: Step, problem: Problem) -> tuple[Join, ...]:
 
 
 def _behind_holes(
-    step: Step, advanced: Sequence[Crack], problem: Problem
+    step: Step, advanced_cracks: Sequence[Crack], problem: Problem
 ) -> list[tuple[int, tuple[float, ...]]]:
     """Cracks whose fronts at both sides of a hole have met behind it, and where."""
-    if len(advanced) < len(step.corrected):
+    if len(advanced_cracks) < len(step.corrected):
         return []
     body, result = Body.of(problem.mesh), []
-    for c, (before, after) in enumerate(zip(step.corrected, problem.placed, strict=True)):
-        if not after.fronts or closed_fronts(before) == closed_fronts(after):
+    for c, (crack_before, crack_after) in enumerate(
+        zip(step.corrected, problem.placed, strict=True)
+    ):
+        if not crack_after.fronts or closed_fronts(crack_before) == closed_fronts(crack_after):
             continue
-        gaps, left = ends_at_holes(before, body), ends_at_holes(after, body)
-        if len(gaps) <= len(left):
+        gaps, ends_left = ends_at_holes(crack_before, body), ends_at_holes(crack_after, body)
+        if len(gaps) <= len(ends_left):
             continue
-        x = np.concatenate([front.x for front in front_frames(after)])
+        x = np.concatenate([front.x for front in front_frames(crack_after)])
         # The gap that is gone is the one farthest from those that are left.
-        away = [min((float(np.linalg.norm(x - y)) for y in left), default=np.inf) for x in gaps]
-        middle = gaps[int(np.argmax(away))]
+        distances = [
+            min((float(np.linalg.norm(x - y)) for y in ends_left), default=np.inf) for x in gaps
+        ]
+        middle = gaps[int(np.argmax(distances))]
         place = x[int(np.argmin(np.linalg.norm(x - middle, axis=1)))]
         result.append((c, tuple(place.tolist())))
     return result
 
 
-def cut_off(step: Step, problem: Problem, joins: Sequence[Join]) -> str:
+def cut_off(step: Step, problem: Problem, joins_of_step: Sequence[Join]) -> str:
     """Why a run ends in which cracks that met cut a piece off; empty where they do not."""
-    if not joins or (problem.mesh.dim == 3 and not problem.junctions):
+    if not joins_of_step or (problem.mesh.dim == 3 and not problem.junctions):
         return ""
     piece = piece_cut_off(step, problem)
-    return "; ".join(map(str, joins)) + f": {piece}" if piece else ""
+    return "; ".join(map(str, joins_of_step)) + f": {piece}" if piece else ""
 
 
 def piece_cut_off(step: Step, problem: Problem) -> str:
@@ -143,9 +147,9 @@ def coming_arrivals(step: Step, problem: Problem) -> list[Arriving]:
     if mesh.dim == 2:
         result = _arriving_tips(step, plan.cracks, problem.placed, mesh)
     elif plan.apart:
-        scaled = replace(step, da=tuple(plan.part * da for da in step.da))
-        placed = [place_crack(crack, mesh) for crack in plan.apart]
-        result = _arriving_fronts(scaled, plan.apart, placed, mesh)
+        scaled_step = replace(step, da=tuple(plan.part * da for da in step.da))
+        placed_cracks = [place_crack(crack, mesh) for crack in plan.apart]
+        result = _arriving_fronts(scaled_step, plan.apart, placed_cracks, mesh)
     else:
         result = _arriving_fronts(step, plan.cracks, problem.placed, mesh)
     return [_with_identity(step, each) for each in result]
@@ -166,7 +170,7 @@ def _with_identity(step: Step, one: Arriving) -> Arriving:
 
 
 def arrivals_of(
-    rule: GrowthRule, last: Step, arriving: Sequence[Arriving], after: float | None
+    rule: GrowthRule, last: Step, arrivals_ahead: Sequence[Arriving], end_rate: float | None
 ) -> tuple[Arrival, ...]:
     """When places come to the boundary.
 
@@ -175,38 +179,40 @@ def arrivals_of(
     rule : GrowthRule
     last : Step
         Before the advance.
-    arriving : sequence of Arriving
-    after : float, optional
+    arrivals_ahead : sequence of Arriving
+    end_rate : float, optional
         Cycles of the whole advance, where it was solved.
     """
     integrator, mesh = integrator_of(rule), rule.problem.mesh
     result = []
-    for one in arriving:
-        N = last.cycles + integrator.cycles_until(rule, last, one.part, after)
+    for one in arrivals_ahead:
+        N = last.cycles + integrator.cycles_until(rule, last, one.part, end_rate)
         x = tuple(0.0 if abs(v) < _ROUND_OFF * mesh.extent else v for v in one.x)
         result.append(Arrival(one.crack, one.tip, x, one.name, one.ligament, N, one.end, one.label))
     return tuple(result)
 
 
-def have_left(cracks: Sequence[Crack], placed: Sequence[Crack]) -> bool:
+def have_left(cracks: Sequence[Crack], placed_cracks: Sequence[Crack]) -> bool:
     """Whether tips, or whole fronts, have left the body."""
-    return any(_tips_outside(*pair) for pair in zip(cracks, placed, strict=True))
+    return any(_tips_outside(*pair) for pair in zip(cracks, placed_cracks, strict=True))
 
 
-def _tips_outside(advanced: Crack, placed: Crack) -> list[int]:
+def _tips_outside(advanced_crack: Crack, placed_crack: Crack) -> list[int]:
     """Numbers of the tips that have left the body; [0] where all fronts have."""
-    if advanced.fronts is not None:
-        return [0] if advanced.n_tips and not placed.n_tips else []
-    return [j for j, tip in enumerate(advanced.tips or ()) if tip not in (placed.tips or ())]
+    if advanced_crack.fronts is not None:
+        return [0] if advanced_crack.n_tips and not placed_crack.n_tips else []
+    return [
+        j for j, tip in enumerate(advanced_crack.tips or ()) if tip not in (placed_crack.tips or ())
+    ]
 
 
 def _arriving_tips(
-    last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+    last: Step, advanced_cracks: Sequence[Crack], placed_cracks: Sequence[Crack], mesh: Mesh
 ) -> list[Arriving]:
     """Tips that have left the body, and the part of their straight way that lies inside."""
     result = []
-    for c, pair in enumerate(zip(advanced, placed, strict=True)):
-        start = _starts(last, advanced, c)
+    for c, pair in enumerate(zip(advanced_cracks, placed_cracks, strict=True)):
+        start = _starts(last, advanced_cracks, c)
         for j in _tips_outside(*pair):
             move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
             way = float(np.linalg.norm(move))
@@ -218,29 +224,31 @@ def _arriving_tips(
     return result
 
 
-def _starts(last: Step, advanced: Sequence[Crack], c: int) -> Floats:
+def _starts(last: Step, advanced_cracks: Sequence[Crack], c: int) -> Floats:
     """Where the tips of an advanced crack were before `(f, 2)`."""
-    before = last.corrected
-    if [crack.n_tips for crack in before] == [crack.n_tips for crack in advanced]:
-        return tip_frames(before[c])[0]
+    cracks_before = last.corrected
+    if [crack.n_tips for crack in cracks_before] == [crack.n_tips for crack in advanced_cracks]:
+        return tip_frames(cracks_before[c])[0]
     # Tips have met and are gone: the nearest that was is the same one.
-    every = np.concatenate([tip_frames(crack)[0] for crack in before])
-    now = tip_frames(advanced[c])[0]
-    return every[[int(np.argmin(np.linalg.norm(every - x, axis=1))) for x in now]]
+    every = np.concatenate([tip_frames(crack)[0] for crack in cracks_before])
+    tips_now = tip_frames(advanced_cracks[c])[0]
+    return every[[int(np.argmin(np.linalg.norm(every - x, axis=1))) for x in tips_now]]
 
 
-def ended_crack(advanced: Crack, placed: Crack, arriving: Sequence[Arriving]) -> Crack:
+def ended_crack(
+    advanced_crack: Crack, placed_crack: Crack, arrivals_ahead: Sequence[Arriving]
+) -> Crack:
     """A crack that has left the body, as it ends there: in 2D where it meets the boundary."""
-    if placed.fronts is not None:
-        return placed
-    points = np.array(placed.points)
-    for each in arriving:
-        points[(advanced.tips or ())[each.tip]] = each.x
-    return Crack(points, placed.faces, ())
+    if placed_crack.fronts is not None:
+        return placed_crack
+    points = np.array(placed_crack.points)
+    for each in arrivals_ahead:
+        points[(advanced_crack.tips or ())[each.tip]] = each.x
+    return Crack(points, placed_crack.faces, ())
 
 
 def _arriving_fronts(
-    last: Step, advanced: Sequence[Crack], placed: Sequence[Crack], mesh: Mesh
+    last: Step, advanced_cracks: Sequence[Crack], placed_cracks: Sequence[Crack], mesh: Mesh
 ) -> list[Arriving]:
     """Facet sets that a front has come to, each with the place along it that was first.
 
@@ -253,7 +261,7 @@ def _arriving_fronts(
         return names[group[outer[signed_in(body.boundary, x[None])[1][0]]]]
 
     result = []
-    for c, pair in enumerate(zip(advanced, placed, strict=True)):
+    for c, pair in enumerate(zip(advanced_cracks, placed_cracks, strict=True)):
         start, move = last.sif[0][c].x, moved_places(last, c) - last.sif[0][c].x
         part_inside = _parts(start, move, body)
         x = start + np.minimum(part_inside, 1.0)[:, None] * move
@@ -263,23 +271,27 @@ def _arriving_fronts(
                 for place, y, way, part in _last_out(start, move, part_inside, body)
             ]
             continue
-        before = [x for _, x in front_ends(last.corrected[c], body)]
-        known = {name_at(each) for each in before}
+        ends_before = [x for _, x in front_ends(last.corrected[c], body)]
+        names_before = {name_at(each) for each in ends_before}
         reach = 2.0 * float(np.linalg.norm(move, axis=1).max(initial=0.0))
         for _, end in front_ends(pair[1], body):
-            name, near = name_at(end), reach + _REACH * float(body.cell_size(end[None])[0])
-            away = min((float(np.linalg.norm(end - each)) for each in before), default=np.inf)
-            if name in known and away <= near:
+            name, reach_of_end = name_at(end), reach + _REACH * float(body.cell_size(end[None])[0])
+            distance = min(
+                (float(np.linalg.norm(end - each)) for each in ends_before), default=np.inf
+            )
+            if name in names_before and distance <= reach_of_end:
                 continue
-            known.add(name)
-            before.append(end)
+            names_before.add(name)
+            ends_before.append(end)
             gap = np.linalg.norm(x - end, axis=1)
-            out = np.isfinite(part_inside) & (gap <= near + reach)
-            out &= np.array([bool(o) and name_at(each) == name for o, each in zip(out, x)], bool)
-            place = int(np.argmin(np.where(out, part_inside, np.inf) if out.any() else gap))
-            there, part = (x[place], float(part_inside[place])) if out.any() else (end, 1.0)
-            way = float(np.linalg.norm(there - start[place]))
-            result.append(Arriving(c, place, tuple(there.tolist()), name, way, part))
+            is_out = np.isfinite(part_inside) & (gap <= reach_of_end + reach)
+            is_out &= np.array(
+                [bool(o) and name_at(each) == name for o, each in zip(is_out, x)], bool
+            )
+            place = int(np.argmin(np.where(is_out, part_inside, np.inf) if is_out.any() else gap))
+            place_out, part = (x[place], float(part_inside[place])) if is_out.any() else (end, 1.0)
+            way = float(np.linalg.norm(place_out - start[place]))
+            result.append(Arriving(c, place, tuple(place_out.tolist()), name, way, part))
     return result
 
 
@@ -291,9 +303,9 @@ def _last_out(
     The last pieces of a front are too short for the mesh: they go on straight.
     """
     part = np.array(part)
-    for longer in _LONGER:
-        inside = np.isinf(part)
-        part[inside] = longer * _parts(start[inside], longer * move[inside], body)
+    for factor in _LONGER:
+        is_inside = np.isinf(part)
+        part[is_inside] = factor * _parts(start[is_inside], factor * move[is_inside], body)
     part[np.isinf(part)] = -1.0  # it waits, or runs along a side
     if not len(part) or part.max() < 0:
         return []
@@ -307,13 +319,13 @@ def _parts(start: Floats, move: Floats, body: Body) -> Floats:
     part = np.full(len(start), np.inf)
     if not len(start):
         return part
-    out = np.nonzero((body.depth(start)[0] < 0) & (body.depth(start + move)[0] >= 0))[0]
-    low, high = np.zeros(len(out)), np.ones(len(out))
+    rows_out = np.nonzero((body.depth(start)[0] < 0) & (body.depth(start + move)[0] >= 0))[0]
+    low, high = np.zeros(len(rows_out)), np.ones(len(rows_out))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        outside = body.depth(start[out] + middle[:, None] * move[out])[0] >= 0
-        low, high = np.where(outside, low, middle), np.where(outside, middle, high)
-    part[out] = high
+        is_outside = body.depth(start[rows_out] + middle[:, None] * move[rows_out])[0] >= 0
+        low, high = np.where(is_outside, low, middle), np.where(is_outside, middle, high)
+    part[rows_out] = high
     return part
 
 

@@ -47,7 +47,7 @@ class FrontWaves:
 
 
 def response(
-    s: Floats, advance: Floats, exponent: float, turning: float, closed: bool, length: float
+    s: Floats, advance: Floats, exponent: float, turning_rate: float, is_closed: bool, length: float
 ) -> FrontWaves | None:
     """Response of one front; None where it is too short to have any.
 
@@ -59,9 +59,9 @@ def response(
         By the rates at the beginning of the step.
     exponent : float
         Of the growth law.
-    turning : float, rad
+    turning_rate : float, rad
         By which the front turns from its first place to its last one: a circle stays one.
-    closed : bool
+    is_closed : bool
     length : float, length
         Of the whole front.
 
@@ -73,20 +73,22 @@ def response(
     if len(s) < _FEWEST or advance.max() <= 0:
         return None
     n = 2 * len(s)
-    span = length if closed else float(s.max() - s.min())
+    span = length if is_closed else float(s.max() - s.min())
     if span <= 0:
         return None
-    place = np.arange(n) * span / n if closed else s.min() + (np.arange(n) + 0.5) * span / n
-    even = along_front(s, advance, place, closed, length)
-    root = np.sqrt(0.5 * exponent * np.where(even > _TINY * even.max(), even, 0.0))
-    S = root[:, None] * _wave_operator(n, span, closed, turning / span) * root
+    place = np.arange(n) * span / n if is_closed else s.min() + (np.arange(n) + 0.5) * span / n
+    even_advance = along_front(s, advance, place, is_closed, length)
+    root = np.sqrt(
+        0.5 * exponent * np.where(even_advance > _TINY * even_advance.max(), even_advance, 0.0)
+    )
+    S = root[:, None] * _wave_operator(n, span, is_closed, turning_rate / span) * root
     decay, modes = np.linalg.eigh((S + S.T) / 2)
-    return FrontWaves(place, root, modes, np.maximum(decay, 0.0), closed, length)
+    return FrontWaves(place, root, modes, np.maximum(decay, 0.0), is_closed, length)
 
 
-def _wave_operator(n: int, span: float, closed: bool, kappa: float) -> Floats:
+def _wave_operator(n: int, span: float, is_closed: bool, kappa: float) -> Floats:
     """Matrix `(n, n)` of max(|k| - κ, 0) on even points: by Fourier, or mirrored at both ends."""
-    if closed:
+    if is_closed:
         number = np.abs(np.fft.fftfreq(n, 1 / n))
         wave = np.exp(2j * np.pi * np.outer(np.arange(n), np.fft.fftfreq(n, 1 / n)) / n) / np.sqrt(
             n
@@ -100,33 +102,35 @@ def _wave_operator(n: int, span: float, closed: bool, kappa: float) -> Floats:
     return np.asarray((cosine * factor) @ cosine.T)
 
 
-def predicted(front: FrontWaves | None, s: Floats, advance: Floats) -> Floats:
+def predicted_advance(front: FrontWaves | None, s: Floats, advance: Floats) -> Floats:
     """Advance of a step by the rates at its beginning `(f,)`, length."""
     if front is None:
         return advance
 
-    def change(even: Floats) -> Floats:
-        return _weighted_response(front, even, _phi_1(front.decay) - 1)
+    def change(even_advance: Floats) -> Floats:
+        return _weighted_response(front, even_advance, _phi_1(front.decay) - 1)
 
     return _changed_advance(front, s, advance, advance, change)
 
 
-def corrected(front: FrontWaves | None, s: Floats, advance: Floats, later: Floats) -> Floats:
+def corrected_advance(
+    front: FrontWaves | None, s: Floats, advance: Floats, later_advance: Floats
+) -> Floats:
     """Advance of a step by the rates at its beginning and those at its predicted end.
 
     Notes
     -----
     r E [φ₁ ã₀ + φ₂ (ã* - e^-Λ ã₀)], ã = Eᵀ(a/r): of second order, and stable.
     """
-    mean = 0.5 * (advance + later)
+    mean = 0.5 * (advance + later_advance)
     if front is None:
         return mean
 
-    def change(even: Floats) -> Floats:
-        after = along_front(s, later, front.place, front.closed, front.length)
+    def change(even_advance: Floats) -> Floats:
+        later_at_places = along_front(s, later_advance, front.place, front.closed, front.length)
         phi_1, phi_2 = _phi_1(front.decay), _phi_2(front.decay)
-        first = _weighted_response(front, even, phi_1 - phi_2 * np.exp(-front.decay) - 0.5)
-        return first + _weighted_response(front, after, phi_2 - 0.5)
+        first = _weighted_response(front, even_advance, phi_1 - phi_2 * np.exp(-front.decay) - 0.5)
+        return first + _weighted_response(front, later_at_places, phi_2 - 0.5)
 
     return _changed_advance(front, s, advance, mean, change)
 
@@ -135,46 +139,46 @@ def _changed_advance(
     front: FrontWaves,
     s: Floats,
     advance: Floats,
-    plain: Floats,
+    advance_without: Floats,
     change: Callable[[Floats], Floats],
 ) -> Floats:
     """A plain advance with the change that the response makes on even points."""
-    even = along_front(s, advance, front.place, front.closed, front.length)
-    less = along_front(front.place, change(even), s, front.closed, front.length)
-    return np.asarray(np.maximum(plain + less, 0.0))
+    even_advance = along_front(s, advance, front.place, front.closed, front.length)
+    change_at_places = along_front(front.place, change(even_advance), s, front.closed, front.length)
+    return np.asarray(np.maximum(advance_without + change_at_places, 0.0))
 
 
 def _weighted_response(front: FrontWaves, values: Floats, factor: Floats) -> Floats:
     """Value r E f Eᵀ (values/r), zero where nothing grows."""
-    grows = front.root > 0
-    scaled = np.where(grows, values / np.where(grows, front.root, 1.0), 0.0)
-    return np.asarray(front.root * (front.modes @ (factor * (front.modes.T @ scaled))))
+    is_growing = front.root > 0
+    scaled_values = np.where(is_growing, values / np.where(is_growing, front.root, 1.0), 0.0)
+    return np.asarray(front.root * (front.modes @ (factor * (front.modes.T @ scaled_values))))
 
 
 def _phi_1(q: Floats) -> Floats:
     """(1 - e^-q)/q."""
-    small = q < 1e-6
-    safe = np.where(small, 1.0, q)
-    return np.where(small, 1 - q / 2, -np.expm1(-safe) / safe)
+    is_small = q < 1e-6
+    safe_q = np.where(is_small, 1.0, q)
+    return np.where(is_small, 1 - q / 2, -np.expm1(-safe_q) / safe_q)
 
 
 def _phi_2(q: Floats) -> Floats:
     """(e^-q - 1 + q)/q²."""
-    small = q < 1e-3
-    safe = np.where(small, 1.0, q)
-    return np.where(small, 0.5 - q / 6 + q**2 / 24, (np.expm1(-safe) + safe) / safe**2)
+    is_small = q < 1e-3
+    safe_q = np.where(is_small, 1.0, q)
+    return np.where(is_small, 0.5 - q / 6 + q**2 / 24, (np.expm1(-safe_q) + safe_q) / safe_q**2)
 
 
-def turning_of(x: Floats, closed: bool) -> float:
+def turning_of(x: Floats, is_closed: bool) -> float:
     """By how much a front turns as a whole, rad: not by its zigzag.
 
     Parameters
     ----------
     x : (f, 3) array, length
         Points in order.
-    closed : bool
+    is_closed : bool
     """
-    if closed:
+    if is_closed:
         return 2 * np.pi
     j = max(1, len(x) // 6)
     first, last = x[j] - x[0], x[-1] - x[-1 - j]
@@ -188,7 +192,7 @@ _FEWEST_OF_A_WAVE = 8  # places of a front
 _MIXED = 3.0  # times its noise, from which on K_II is an answer that a filter would only bend
 
 
-def without_noise(sif: SIF, angle: Floats, closed: Floats, length: Floats) -> Floats:
+def without_noise(sif: SIF, angle: Floats, is_closed: Floats, length: Floats) -> Floats:
     """Kink angles along all fronts of a crack by a Wiener filter in wave number.
 
     Parameters
@@ -196,7 +200,7 @@ def without_noise(sif: SIF, angle: Floats, closed: Floats, length: Floats) -> Fl
     sif : SIF
         Of the state with the largest K_I.
     angle : (f,) array, rad
-    closed : (k,) array of bool
+    is_closed : (k,) array of bool
         Of each front.
     length : (k,) array, length
         Of each front.
@@ -216,37 +220,46 @@ def without_noise(sif: SIF, angle: Floats, closed: Floats, length: Floats) -> Fl
     for number in np.unique(sif.front):
         rows = np.nonzero(sif.front == number)[0]
         K_I, noise = sif.K_I[rows], sif.spread[rows, 1]
-        good = np.isfinite(sif.K[rows]).all() and np.isfinite(noise).all() and K_I.max() > 0
-        if len(rows) < _FEWEST_OF_A_WAVE or not good or angle[rows].any() == 0:
+        has_waves = np.isfinite(sif.K[rows]).all() and np.isfinite(noise).all() and K_I.max() > 0
+        if len(rows) < _FEWEST_OF_A_WAVE or not has_waves or angle[rows].any() == 0:
             continue
         if np.sqrt((sif.K_II[rows] ** 2).mean()) > _MIXED * np.sqrt((noise**2).mean()):
             continue
         error = 2 * noise / np.maximum(K_I, 0.3 * K_I.max())
         result[rows] = _filtered_angle(
-            sif.s[rows], angle[rows], error, bool(closed[number]), float(length[number])
+            sif.s[rows], angle[rows], error, bool(is_closed[number]), float(length[number])
         )
     return result
 
 
-def _filtered_angle(s: Floats, angle: Floats, error: Floats, closed: bool, length: float) -> Floats:
+def _filtered_angle(
+    s: Floats, angle: Floats, error: Floats, is_closed: bool, length: float
+) -> Floats:
     n = 2 * len(s)
-    span = length if closed else float(s.max() - s.min())
-    place = np.arange(n) * span / n if closed else s.min() + (np.arange(n) + 0.5) * span / n
-    even = along_front(s, angle, place, closed, length)
+    span = length if is_closed else float(s.max() - s.min())
+    place = np.arange(n) * span / n if is_closed else s.min() + (np.arange(n) + 0.5) * span / n
+    even_angle = along_front(s, angle, place, is_closed, length)
     noise = n * float((error**2).mean()) / max(4, int(len(s) / _WAVES))
-    wave = np.fft.fft(even, norm="ortho") if closed else dct(even, norm="ortho")
+    wave = np.fft.fft(even_angle, norm="ortho") if is_closed else dct(even_angle, norm="ortho")
     power = np.abs(wave) ** 2
     window = np.arange(-_BAND, _BAND + 1)
-    near = np.arange(n)[:, None] + window
-    near = near % n if closed else np.abs(np.clip(near, 1 - n, n - 1))
-    mean = power[near].mean(axis=1)
+    rows_nearby = np.arange(n)[:, None] + window
+    rows_nearby = rows_nearby % n if is_closed else np.abs(np.clip(rows_nearby, 1 - n, n - 1))
+    mean = power[rows_nearby].mean(axis=1)
     share = np.clip(1 - noise / np.maximum(mean, 1e-300), 0.0, 1.0)
     share[0] = 1.0
-    if closed:
-        less = np.fft.ifft((share - 1) * wave, norm="ortho").real
+    if is_closed:
+        change = np.fft.ifft((share - 1) * wave, norm="ortho").real
     else:
-        less = idct((share - 1) * wave, norm="ortho")
-    return np.asarray(angle + along_front(place, less, s, closed, length))
+        change = idct((share - 1) * wave, norm="ortho")
+    return np.asarray(angle + along_front(place, change, s, is_closed, length))
 
 
-__all__ = ["FrontWaves", "corrected", "predicted", "response", "turning_of", "without_noise"]
+__all__ = [
+    "FrontWaves",
+    "corrected_advance",
+    "predicted_advance",
+    "response",
+    "turning_of",
+    "without_noise",
+]

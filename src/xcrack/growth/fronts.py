@@ -28,8 +28,8 @@ from xcrack.fatigue.retardation import (
 )
 from xcrack.growth.front_filter import (
     FrontWaves,
-    corrected,
-    predicted,
+    corrected_advance,
+    predicted_advance,
     response,
     turning_of,
     without_noise,
@@ -64,7 +64,7 @@ _SHORTEST = 0.6  # cells: a shorter step of a front would end in those in which 
 def interpolate_along_front(
     x: Floats,
     front: Ints,
-    closed: Sequence[bool],
+    is_closed: Sequence[bool],
     values: Floats,
     target: Floats,
     reach: float,
@@ -77,7 +77,7 @@ def interpolate_along_front(
         Places with values, in order along each front.
     front : (f,) array of int
         Which front.
-    closed : sequence of bool
+    is_closed : sequence of bool
         Whether each front is closed.
     values : (f,) or (f, m) array
     target : (g, 3) array, length
@@ -94,19 +94,22 @@ def interpolate_along_front(
     best = np.full(len(target), float(reach))
     for number in np.unique(front):
         is_of_front = front == number
-        line, along = x[is_of_front], values[is_of_front]
+        line, values_on_line = x[is_of_front], values[is_of_front]
         if len(line) == 1:
-            line, along = np.concatenate([line, line]), np.concatenate([along, along])
-        shut = bool(closed[number]) and len(line) > 2
-        r, segment, place = front_distance(target, line, shut)
-        following = (segment + 1) % len(line)
+            line, values_on_line = (
+                np.concatenate([line, line]),
+                np.concatenate([values_on_line, values_on_line]),
+            )
+        is_loop = bool(is_closed[number]) and len(line) > 2
+        r, segment, place = front_distance(target, line, is_loop)
+        next_point = (segment + 1) % len(line)
         place = np.nan_to_num(place).reshape(-1, *[1] * (values.ndim - 1))
-        first, second = along[segment], along[following]
+        first, second = values_on_line[segment], values_on_line[next_point]
         with np.errstate(invalid="ignore"):  # inf where the toughness is reached
-            between = (1 - place) * first + place * second
-        value = np.where(place == 0, first, np.where(place == 1, second, between))
-        nearer = r <= best
-        result[nearer], best[nearer] = value[nearer], r[nearer]
+            interpolated = (1 - place) * first + place * second
+        value = np.where(place == 0, first, np.where(place == 1, second, interpolated))
+        is_nearer = r <= best
+        result[is_nearer], best[is_nearer] = value[is_nearer], r[is_nearer]
     return result
 
 
@@ -121,8 +124,8 @@ def _values_beside(part: GrowthStations, values: Floats, x: Floats, mesh: Mesh) 
 def _closed_fronts(part: GrowthStations) -> list[bool]:
     """Of each front of a crack whether it is closed."""
     result = [False] * (int(part.front.max(initial=-1)) + 1)
-    for number, closed in zip(part.front.tolist(), part.closed.tolist(), strict=True):
-        result[number] = closed
+    for number, is_closed in zip(part.front.tolist(), part.closed.tolist(), strict=True):
+        result[number] = is_closed
     return result
 
 
@@ -141,14 +144,14 @@ def _solved_fronts(
     """All fronts as they were solved."""
     at = rates.stations
     n = len(at)
-    angle, closed, length = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n)
+    angle, is_closed, length = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n)
     for c, crack in enumerate(rates.cracks):
         rows = at.crack == c
-        shut, whole = np.array(closed_fronts(crack), dtype=bool), front_lengths(crack)
+        is_closed_front, lengths = np.array(closed_fronts(crack), dtype=bool), front_lengths(crack)
         states = [state[c] for state in rates.sif]
-        most = max(states, key=lambda each: each.K_I.max(initial=-np.inf))
-        angle[rows] = without_noise(most, rates.angle[rows], shut, whole)
-        closed[rows], length[rows] = shut[at.front[rows]], whole[at.front[rows]]
+        most_open = max(states, key=lambda each: each.K_I.max(initial=-np.inf))
+        angle[rows] = without_noise(most_open, rates.angle[rows], is_closed_front, lengths)
+        is_closed[rows], length[rows] = is_closed_front[at.front[rows]], lengths[at.front[rows]]
     stations = GrowthStations(
         crack=at.crack,
         front=at.front,
@@ -156,7 +159,7 @@ def _solved_fronts(
         x=at.x,
         frame=at.frame,
         end=identities.of(at),
-        closed=closed,
+        closed=is_closed,
         length=length,
         offset=np.zeros_like(at.x),
         fresh=np.zeros(n, dtype=bool),
@@ -179,27 +182,27 @@ def _corrected_part(
     c: int,
     cracks: Sequence[Crack],
     identities: Identities,
-    solved: tuple[GrowthStations, SolveHistory],
-    before: GrowthStations,
-    waits: Floats,
+    solved_part: tuple[GrowthStations, SolveHistory],
+    stations_before: GrowthStations,
+    growth_owed: Floats,
 ) -> tuple[GrowthStations, SolveHistory]:
     """Stations of a corrected crack, with what was solved close by."""
-    here, solves = solved
+    stations_here, solves = solved_part
     crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
     x = np.concatenate([front.x for front in fronts])
     count = [len(front.x) for front in fronts]
     number = np.repeat(np.arange(len(fronts)), count)
-    rate = _values_beside(here, solves.rate[0], x, mesh)
-    there = ~np.isnan(rate) & inside_body(cracks, c, mesh, x)
-    x, number = x[there], number[there]
+    rate = _values_beside(stations_here, solves.rate[0], x, mesh)
+    has_rate = ~np.isnan(rate) & inside_body(cracks, c, mesh, x)
+    x, number = x[has_rate], number[has_rate]
     lengths = front_lengths(crack)
     part = GrowthStations(
         crack=np.full(len(x), c),
         front=number,
-        s=np.concatenate([front.s[: len(front.x)] for front in fronts])[there],
+        s=np.concatenate([front.s[: len(front.x)] for front in fronts])[has_rate],
         x=x,
-        frame=np.concatenate([front.frame for front in fronts])[there],
+        frame=np.concatenate([front.frame for front in fronts])[has_rate],
         end=np.array(identities.ends[c], dtype=np.int64)[number],
         closed=np.array(closed_fronts(crack), dtype=bool)[number],
         length=lengths[number],
@@ -207,15 +210,16 @@ def _corrected_part(
         fresh=np.zeros(len(x), dtype=bool),
     )
     direction = np.stack(
-        [_values_beside(here, solves.direction[0][:, k], x, mesh) for k in range(3)], axis=1
+        [_values_beside(stations_here, solves.direction[0][:, k], x, mesh) for k in range(3)],
+        axis=1,
     )
-    rest = np.nan_to_num(_values_beside(before, waits, x, mesh))
+    rest = np.nan_to_num(_values_beside(stations_before, growth_owed, x, mesh))
     unit = direction / np.linalg.norm(direction, axis=1)[:, None]
     part = replace(part, offset=rest[:, None] * unit)
     return part, replace(
         solves,
-        rate=rate[there][None],
-        dK_eq=_values_beside(here, solves.dK_eq[0], x, mesh)[None],
+        rate=rate[has_rate][None],
+        dK_eq=_values_beside(stations_here, solves.dK_eq[0], x, mesh)[None],
         direction=direction[None],
         scale=np.full(len(x), crack_size(cracks, c, mesh)),
         bend=np.zeros(len(x)),
@@ -224,21 +228,24 @@ def _corrected_part(
 
 
 def _kinds_near(
-    solved: GrowthStations, kinds: BlockCycles, x: Floats, lost: BlockCycles | None = None
+    solved_stations: GrowthStations,
+    kinds: BlockCycles,
+    x: Floats,
+    kinds_elsewhere: BlockCycles | None = None,
 ) -> BlockCycles:
     """Cycles of a block of a crack at some places, linear between those that were solved."""
-    if not len(solved.x):
-        return kinds if lost is None else lost
+    if not len(solved_stations.x):
+        return kinds if kinds_elsewhere is None else kinds_elsewhere
     p = kinds.dK.shape[2]
     values = np.concatenate([kinds.dK[0], kinds.R[0]], axis=1)
-    near = interpolate_along_front(
-        solved.x, solved.front, _closed_fronts(solved), values, x, np.inf
+    values_nearby = interpolate_along_front(
+        solved_stations.x, solved_stations.front, _closed_fronts(solved_stations), values, x, np.inf
     )
     a = np.full((1, len(x)), float(kinds.a.flat[0]))
     sets = kinds.sets
     if sets is not None:
-        sets = sets[np.linalg.norm(x[:, None] - solved.x, axis=2).argmin(axis=1)]
-    return BlockCycles(near[None, :, :p], near[None, :, p:], a, sets)
+        sets = sets[np.linalg.norm(x[:, None] - solved_stations.x, axis=2).argmin(axis=1)]
+    return BlockCycles(values_nearby[None, :, :p], values_nearby[None, :, p:], a, sets)
 
 
 def _all_kinds(parts: Sequence[BlockCycles]) -> BlockCycles:
@@ -311,32 +318,37 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     """The next step by the rates at its beginning."""
     stations, solves = solves_of(step)
     rate, cell = _rate(rule, solves), cell_sizes(rule.problem.mesh, stations.x)
-    fastest = float(rate.max(initial=0.0))
+    fastest_rate = float(rate.max(initial=0.0))
     plan = Plan.at_rest(step, cell)
-    if fastest == 0 or np.isinf(fastest):
-        stopped = rule.retardation is not None and fastest == 0
-        return replace(plan, limit="arrest" if stopped else "")
-    by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest
+    if fastest_rate == 0 or np.isinf(fastest_rate):
+        is_arrested = rule.retardation is not None and fastest_rate == 0
+        return replace(plan, limit="arrest" if is_arrested else "")
+    by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest_rate
     largest = float(min(longest(rule, step.control), by_cycles))
     row = int(np.argmax(rate))
     growth = stations.growth(rate, largest)
-    goes = growth >= WAITS_BELOW * cell
-    way = _arcs(step, np.where(goes, growth, 0.0))
-    near = whole_front_ahead(rule, stations.x, _move(stations, _angle(stations, solves), way))
-    if near is not None and (way > near.stop).any():  # it ends before an interface, or behind
-        reaches = way > near.stop
-        share, passes = near.goal[reaches] / way[reaches], (near.goal > near.way)[reaches]
+    is_growing = growth >= WAITS_BELOW * cell
+    way = _arcs(step, np.where(is_growing, growth, 0.0))
+    interfaces = whole_front_ahead(rule, stations.x, _move(stations, _angle(stations, solves), way))
+    if (
+        interfaces is not None and (way > interfaces.stop).any()
+    ):  # it ends before an interface, or behind
+        is_beyond = way > interfaces.stop
+        share, passes = (
+            interfaces.goal[is_beyond] / way[is_beyond],
+            (interfaces.goal > interfaces.way)[is_beyond],
+        )
         largest *= float(share[passes].max() if passes.any() else share.min())
         growth = stations.growth(rate, largest)
-        goes = growth >= WAITS_BELOW * cell
-        way = _arcs(step, np.where(goes, growth, 0.0))
+        is_growing = growth >= WAITS_BELOW * cell
+        way = _arcs(step, np.where(is_growing, growth, 0.0))
     plan = replace(
         plan,
         length=largest,
-        cycles=largest / fastest,
+        cycles=largest / fastest_rate,
         arc=way,
         move=_move(stations, _angle(stations, solves), way),
-        moves=goes,
+        moves=is_growing,
         tip=row,
         largest=largest,
     )
@@ -348,7 +360,9 @@ def _arcs(step: Step, da: Floats) -> Floats:
     stations, solves = solves_of(step)
     way = np.array(da)
     for rows, front in _waves(stations, solves, da):
-        way[rows] = np.where(da[rows] > 0, predicted(front, stations.s[rows], da[rows]), 0.0)
+        way[rows] = np.where(
+            da[rows] > 0, predicted_advance(front, stations.s[rows], da[rows]), 0.0
+        )
     return way
 
 
@@ -370,8 +384,8 @@ def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> li
     """The cracks after a part of a planned advance."""
     stations, solves = solves_of(step)
     growth = stations.growth(_rate(rule, solves), plan.largest)
-    goes = growth >= WAITS_BELOW * plan.cell
-    return advanced(rule, step, _arcs(step, part * np.where(goes, growth, 0.0)))
+    is_growing = growth >= WAITS_BELOW * plan.cell
+    return advanced(rule, step, _arcs(step, part * np.where(is_growing, growth, 0.0)))
 
 
 def advanced_crack(
@@ -393,11 +407,11 @@ def _waves(
     result = []
     for end in np.unique(stations.crack * 10**6 + stations.front):
         rows = np.nonzero(stations.crack * 10**6 + stations.front == end)[0]
-        closed, s = bool(stations.closed[rows[0]]), stations.s[rows]
+        is_closed, s = bool(stations.closed[rows[0]]), stations.s[rows]
         order = np.argsort(s)
-        turning = turning_of(stations.x[rows][order], closed) if len(rows) > 2 else 0.0
+        turning_rate = turning_of(stations.x[rows][order], is_closed) if len(rows) > 2 else 0.0
         length = float(stations.length[rows[0]])
-        waves = response(s, advance[rows], solves.exponent, turning, closed, length)
+        waves = response(s, advance[rows], solves.exponent, turning_rate, is_closed, length)
         result.append((rows, waves))
     return result
 
@@ -415,8 +429,10 @@ def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
     parts = [np.zeros(0)]
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
-        near = _values_beside(stations.at(rows), plan.arc[rows], at.x[at.crack == c], mesh)
-        parts.append(np.nan_to_num(near))
+        advance_nearby = _values_beside(
+            stations.at(rows), plan.arc[rows], at.x[at.crack == c], mesh
+        )
+        parts.append(np.nan_to_num(advance_nearby))
     return np.concatenate(parts)
 
 
@@ -425,8 +441,8 @@ def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
 
 def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
     """The first step of a run."""
-    none = rates.split(np.zeros(len(rates.stations)))
-    return begin_at(rule, rates, identities, 0.0, StepError(none, 0.0))
+    no_error = rates.split(np.zeros(len(rates.stations)))
+    return begin_at(rule, rates, identities, 0.0, StepError(no_error, 0.0))
 
 
 def begin_at(
@@ -455,82 +471,86 @@ def _shortest_step(rule: GrowthRule, stations: GrowthStations, solves: SolveHist
     """Shortest step of the fastest station, length."""
     if not len(stations):
         return 0.0
-    fastest = stations.x[[int(np.argmax(_rate(rule, solves)))]]
-    return _SHORTEST * float(cell_sizes(rule.problem.mesh, fastest)[0])
+    fastest_place = stations.x[[int(np.argmax(_rate(rule, solves)))]]
+    return _SHORTEST * float(cell_sizes(rule.problem.mesh, fastest_place)[0])
 
 
 def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """Advance the fronts of the last step again, now by the rates at both ends of the step."""
     plan, (stations, solves) = plan_of(last), solves_of(last)
     error = StepError((), 0.0) if last.error is None else last.error
-    solved = _solved_fronts(rule, rates, identities, plan.end)
-    here = [_part(solved, c) for c in range(len(rates.cracks))]
+    solved_fronts = _solved_fronts(rule, rates, identities, plan.end)
+    parts_here = [_part(solved_fronts, c) for c in range(len(rates.cracks))]
     first_rate = _rate(rule, solves)
-    fastest = float(first_rate.max(initial=0.0))
-    rate, direction = _carried_back(rule, last, rates, here)
+    fastest_rate = float(first_rate.max(initial=0.0))
+    rate, direction = _carried_back(rule, last, rates, parts_here)
     cycles, cycle_error = _cycles(rule, last, rates)
     share = plan.length / rate.max(initial=0.0) * rate if rate.max(initial=0.0) > 0 else None
-    marched = None
-    if rule.retardation is not None and 0 < fastest < np.inf:
-        marched = _overloads_between(rule, last, rates, here)
-        rate = rate_at_end(first_rate, marched[0], plan.cycles)
-        share = plan.length / fastest * rate
-        cycles = marched[1]
+    overloads = None
+    if rule.retardation is not None and 0 < fastest_rate < np.inf:
+        overloads = _overloads_between(rule, last, rates, parts_here)
+        rate = rate_at_end(first_rate, overloads[0], plan.cycles)
+        share = plan.length / fastest_rate * rate
+        cycles = overloads[1]
         cycle_error = share_left(rule) * beyond_trapezoid(cycles, plan.cycles)
-    across = cycles_of_passage(rule, last, rates)
-    if across is not None:  # places stay where they are, a cell behind
-        cycles, share = across, None
-    if np.isinf(rates.rate).any() or fastest == 0:
+    cycles_across = cycles_of_passage(rule, last, rates)
+    if cycles_across is not None:  # places stay where they are, a cell behind
+        cycles, share = cycles_across, None
+    if np.isinf(rates.rate).any() or fastest_rate == 0:
         share = None
     parts, zones = [], []
     cracks: list[Crack] = []
     gap, way = np.zeros(len(stations)), np.array(plan.arc)
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
-        again = None
+        corrected_crack = None
         if share is not None and rows.any():
-            again = _corrected_crack(rule, last, c, rates.cracks, share, direction)
-        part = here[c]
-        if again is None:
+            corrected_crack = _corrected_crack(rule, last, c, rates.cracks, share, direction)
+        part = parts_here[c]
+        if corrected_crack is None:
             crack = rates.cracks[c]
             growth = stations.growth(first_rate, plan.length)
-            waits = np.where(plan.moves[rows], 0.0, growth[rows])
-            near = _values_beside(stations.at(rows), waits, part[0].x, rule.problem.mesh)
+            growth_owed = np.where(plan.moves[rows], 0.0, growth[rows])
+            growth_nearby = _values_beside(
+                stations.at(rows), growth_owed, part[0].x, rule.problem.mesh
+            )
             part = (
-                replace(part[0], offset=np.nan_to_num(near)[:, None] * part[1].direction[0]),
+                replace(
+                    part[0], offset=np.nan_to_num(growth_nearby)[:, None] * part[1].direction[0]
+                ),
                 part[1],
             )
         else:
-            crack, waits, gap[rows], way[rows] = again
-            before = stations.at(rows)
+            crack, growth_owed, gap[rows], way[rows] = corrected_crack
+            stations_before = stations.at(rows)
             every = [*cracks, crack, *rates.cracks[c + 1 :]]
-            part = _corrected_part(rule, c, every, identities, part, before, waits)
-        if marched is not None:
-            moved = (stations.x + plan.move)[rows]
-            arc, left = marched[0][rows], marched[2].at(rows)
-            zones.append(zones_onto(left, arc, way[rows], moved, part[0].x))
+            part = _corrected_part(rule, c, every, identities, part, stations_before, growth_owed)
+        if overloads is not None:
+            moved_x = (stations.x + plan.move)[rows]
+            arc, zones_left = overloads[0][rows], overloads[2].at(rows)
+            zones.append(zones_onto(zones_left, arc, way[rows], moved_x, part[0].x))
         cracks.append(crack)
         parts.append(part)
-    after, later = _all_cracks(parts)
+    new_stations, new_solves = _all_cracks(parts)
     if rule.retardation is not None:
         kinds = [
             _kinds_near(each[0], _kinds(each[1]), part[0].x)
-            for each, part in zip(here, parts, strict=True)
+            for each, part in zip(parts_here, parts, strict=True)
         ]
-        later = replace(later, kinds=_all_kinds(kinds))
-    remaining = _all_zones(zones) if zones else None
-    if rule.retardation is not None and remaining is None:
-        remaining = no_zones(len(after))
-    later = _with_mean_rates(rule, after, later, remaining)
-    off = share_left(rule) * float(gap.max(initial=0.0))
+        new_solves = replace(new_solves, kinds=_all_kinds(kinds))
+    zones_of_all = _all_zones(zones) if zones else None
+    if rule.retardation is not None and zones_of_all is None:
+        zones_of_all = no_zones(len(new_stations))
+    new_solves = _with_mean_rates(rule, new_stations, new_solves, zones_of_all)
+    place_error = share_left(rule) * float(gap.max(initial=0.0))
     control = next_control(
-        rule, last.control, plan.length, off, cycle_error, cycles, last.cycles,
-        _shortest_step(rule, after, later), np.inf,
+        rule, last.control, plan.length, place_error, cycle_error, cycles, last.cycles,
+        _shortest_step(rule, new_stations, new_solves), np.inf,
     )  # fmt: skip
     place = _errors_at(rule, last, rates, gap)
     return Corrected(
-        last.cycles + cycles, tuple(cracks), after, later,
-        StepError(place, error.cycles + cycle_error), control, remaining,
+        last.cycles + cycles, tuple(cracks), new_stations, new_solves,
+        StepError(place, error.cycles + cycle_error), control, zones_of_all,
     )  # fmt: skip
 
 
@@ -538,24 +558,24 @@ def _carried_back(
     rule: GrowthRule,
     last: Step,
     rates: Rates,
-    here: Sequence[tuple[GrowthStations, SolveHistory]],
+    parts_here: Sequence[tuple[GrowthStations, SolveHistory]],
 ) -> tuple[Floats, Floats]:
     """Rates (n,) and directions (n, 3) at the end of a step, at the stations of its beginning."""
     plan, (stations, solves) = plan_of(last), solves_of(last)
     mesh, first = rates.problem.mesh, _rate(rule, solves)
     rate, direction = np.array(first), np.array(solves.direction[-1])
-    for c, (part, values) in enumerate(here):
+    for c, (part, values) in enumerate(parts_here):
         rows = np.nonzero(stations.crack == c)[0]
         target = (stations.x + plan.move)[rows]
         law_rate = _values_beside(part, values.rate[0], target, mesh)
-        lost = np.isnan(law_rate)
-        near = np.nan_to_num(_values_beside(part, _rate(rule, values), target, mesh))
-        rate[rows] = np.where(lost, first[rows], near)
+        is_lost = np.isnan(law_rate)
+        rate_nearby = np.nan_to_num(_values_beside(part, _rate(rule, values), target, mesh))
+        rate[rows] = np.where(is_lost, first[rows], rate_nearby)
         heading = np.stack(
             [_values_beside(part, values.direction[0][:, k], target, mesh) for k in range(3)],
             axis=1,
         )
-        direction[rows] = np.where(lost[:, None], solves.direction[-1][rows], heading)
+        direction[rows] = np.where(is_lost[:, None], solves.direction[-1][rows], heading)
     return rate, direction
 
 
@@ -565,7 +585,7 @@ def _corrected_crack(
     c: int,
     cracks: Sequence[Crack],
     share: Floats,
-    later: Floats,
+    later_direction: Floats,
 ) -> tuple[Crack, Floats, Floats, Floats] | None:
     """The corrected crack, growth that waits at the old places, how far these are moved, and grow.
 
@@ -577,31 +597,35 @@ def _corrected_crack(
     first = plan.length / rate.max() * rate
     way = 0.5 * (first + share)
     for is_of_front, front in _waves(stations, solves, first):
-        way[is_of_front] = corrected(
+        way[is_of_front] = corrected_advance(
             front, stations.s[is_of_front], first[is_of_front], share[is_of_front]
         )
     target = stations.waits + way
-    goes = target >= WAITS_BELOW * plan.cell
-    heading = first[:, None] * solves.direction[-1] + share[:, None] * later
-    along = np.einsum("ij,ij->i", heading, stations.frame[:, 0])
-    across = np.einsum("ij,ij->i", heading, stations.frame[:, 1])
-    ahead = _angle(stations, solves)
-    angle = np.where(np.hypot(along, across) == 0, ahead, np.arctan2(across, along))
+    is_growing = target >= WAITS_BELOW * plan.cell
+    heading = first[:, None] * solves.direction[-1] + share[:, None] * later_direction
+    growth_along = np.einsum("ij,ij->i", heading, stations.frame[:, 0])
+    growth_across = np.einsum("ij,ij->i", heading, stations.frame[:, 1])
+    first_angle = _angle(stations, solves)
+    angle = np.where(
+        np.hypot(growth_along, growth_across) == 0,
+        first_angle,
+        np.arctan2(growth_across, growth_along),
+    )
     try:
-        moved = np.where(goes, target, 0.0)
-        crack = advanced_crack(last.corrected[c], stations, c, angle, moved, mesh)
+        moved_length = np.where(is_growing, target, 0.0)
+        crack = advanced_crack(last.corrected[c], stations, c, angle, moved_length, mesh)
         if crack.ends_on:
             every = [crack if k == c else other for k, other in enumerate(cracks)]
-            again = place_arm(every, c, mesh)
+            placed_crack = place_arm(every, c, mesh)
         else:
-            again = place_crack(crack, mesh)
+            placed_crack = place_crack(crack, mesh)
     except GeometryError:
         return None
-    if closed_fronts(again) != closed_fronts(cracks[c]):
+    if closed_fronts(placed_crack) != closed_fronts(cracks[c]):
         return None
     gap = np.linalg.norm(plan.move - _move(stations, angle, target), axis=1)
-    waits, gap = np.where(goes, 0.0, target), np.where(goes, gap, 0.0)
-    return again, waits[rows], gap[rows], way[rows]
+    growth_owed, gap = np.where(is_growing, 0.0, target), np.where(is_growing, gap, 0.0)
+    return placed_crack, growth_owed[rows], gap[rows], way[rows]
 
 
 def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple[Floats, ...]:
@@ -610,16 +634,18 @@ def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple
     result = []
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
-        x, old = rates.sif[0][c].x, last.sif[0][c]
-        adds = _values_beside(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
-        adds = np.nan_to_num(adds)
-        if len(old.x) and last.error is not None:
-            reach = 2 * REACH * float(cell_sizes(mesh, old.x).mean())
+        x, old_sif = rates.sif[0][c].x, last.sif[0][c]
+        error_of_place = _values_beside(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
+        error_of_place = np.nan_to_num(error_of_place)
+        if len(old_sif.x) and last.error is not None:
+            reach = 2 * REACH * float(cell_sizes(mesh, old_sif.x).mean())
             reach += float(gap[rows].max(initial=0.0))
-            before, closed = last.error.place[c], closed_fronts(last.cracks[c])
-            near = interpolate_along_front(old.x, old.front, closed, before, x, reach)
-            adds = adds + np.nan_to_num(near)
-        result.append(np.asarray(adds))
+            error_before, is_closed = last.error.place[c], closed_fronts(last.cracks[c])
+            error_nearby = interpolate_along_front(
+                old_sif.x, old_sif.front, is_closed, error_before, x, reach
+            )
+            error_of_place = error_of_place + np.nan_to_num(error_nearby)
+        result.append(np.asarray(error_of_place))
     return tuple(result)
 
 
@@ -632,16 +658,16 @@ def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
     """
     plan, (stations, solves) = plan_of(last), solves_of(last)
     c = int(stations.crack[plan.tip])
-    before, later = float(solves.rate[-1].max()), float(rates.law_rate.max(initial=0.0))
-    by_first_rate = plan.length / before
-    if later == 0:
+    first_rate, later_rate = float(solves.rate[-1].max()), float(rates.law_rate.max(initial=0.0))
+    by_first_rate = plan.length / first_rate
+    if later_rate == 0:
         return 2 * by_first_rate, 0.0
-    if np.isinf(later):
+    if np.isinf(later_rate):
         return 0.5 * by_first_rate, 0.0
     x = np.log(rates.problem.sizes[c] / float(solves.scale[plan.tip]))
-    y = np.log(later / before)
+    y = np.log(later_rate / first_rate)
     cycles = by_first_rate * float(exprel(x - y) / exprel(x))
-    trapezoid = 0.5 * plan.length * (1 / before + 1 / later)
+    trapezoid = 0.5 * plan.length * (1 / first_rate + 1 / later_rate)
     return cycles, share_left(rule) * abs(cycles - trapezoid)
 
 
@@ -651,42 +677,44 @@ def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | Non
     Of the place that drives: the others pass with it.
     """
     plan, (stations, solves) = plan_of(last), solves_of(last)
-    near, row = whole_front_ahead(rule, stations.x, plan.move), plan.tip
-    if near is None or not plan.arc[row] > near.way[row]:
+    interfaces, row = whole_front_ahead(rule, stations.x, plan.move), plan.tip
+    if interfaces is None or not plan.arc[row] > interfaces.way[row]:
         return None
-    way, length = float(near.way[row]), float(plan.arc[row])
+    way, length = float(interfaces.way[row]), float(plan.arc[row])
     begin, end = float(solves.rate[-1].max()), float(rates.law_rate.max(initial=0.0))
     if not 0 < end < np.inf:  # the run ends there
         cycles = np.array([way, length - way]) / begin
-    elif near.is_smooth[row]:
-        here, there = (
+    elif interfaces.is_smooth[row]:
+        rate_here, rate_there = (
             float(rates_in_set(rule, problem, response, int(k)).max())
             for problem, response, k in (
-                (rates.problem, rates.response, near.before[row]),
-                (*scene_of(rule, last), near.after[row]),
+                (rates.problem, rates.response, interfaces.before[row]),
+                (*scene_of(rule, last), interfaces.after[row]),
             )
         )
         size = float(solves.scale[row])
-        after = rates.problem.sizes[int(stations.crack[row])]
-        unit = (after - size) / length  # of size, which the rates are powers of, over the advance
+        size_after = rates.problem.sizes[int(stations.crack[row])]
+        unit = (
+            size_after - size
+        ) / length  # of size, which the rates are powers of, over the advance
         parts = cycles_across(
             size, unit * way, unit * (length - way),
-            unit * np.array([begin, here]), unit * np.array([there, end]),
+            unit * np.array([begin, rate_here]), unit * np.array([rate_there, end]),
         )  # fmt: skip
         cycles = np.asarray(parts)
     else:
-        exponent, power = rates.exponent(rule.law), float(near.power[row])
+        exponent, power = rates.exponent(rule.law), float(interfaces.power[row])
         cycles = np.array(cycles_of_jump(solves, exponent, end, row, way, length - way, power))
-    at = np.full(len(near.way), np.nan)
+    at = np.full(len(interfaces.way), np.nan)
     at[row] = cycles[0]
-    warn_of_passages(rule, last, near, at)
+    warn_of_passages(rule, last, interfaces, at)
     return float(cycles.sum())
 
 
-def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
+def cycles_until(rule: GrowthRule, step: Step, part: float, end_rate: float | None) -> float:
     """Cycles of a part of the advance after a step, in proportion to it."""
     del rule
-    return part * (plan_of(step).cycles if after is None else after)
+    return part * (plan_of(step).cycles if end_rate is None else end_rate)
 
 
 # Overloads along fronts: rates as means over a step, and zones carried from front to front.
@@ -711,17 +739,17 @@ def _with_mean_rates(
 
     All are 0 where the growths of a step take more cycles than can be counted.
     """
-    fastest = float(_rate(rule, solves).max(initial=0.0))
-    if rule.retardation is None or zones is None or not 0 < fastest < np.inf:
+    fastest_rate = float(_rate(rule, solves).max(initial=0.0))
+    if rule.retardation is None or zones is None or not 0 < fastest_rate < np.inf:
         return solves
     length = np.inf if rule.da is None else rule.da
     blocks = np.inf if rule.cycles is None else rule.cycles
-    length = min(length, blocks * fastest)
+    length = min(length, blocks * fastest_rate)
     ratio = np.ones(len(stations))
-    ahead = _growth_ahead(rule, solves, [_kinds(solves)], zones, length, ratio, blocks)
-    cycles = float(ahead.cycles[-1])
-    grows = cycles > 0 and (ahead.reached >= length or cycles >= blocks * (1 - 1e-9))
-    rate = ahead.arc[-1] / cycles if grows else 0.0 * ahead.arc[-1]
+    growth_ahead = _growth_ahead(rule, solves, [_kinds(solves)], zones, length, ratio, blocks)
+    cycles = float(growth_ahead.cycles[-1])
+    is_growing = cycles > 0 and (growth_ahead.reached >= length or cycles >= blocks * (1 - 1e-9))
+    rate = growth_ahead.arc[-1] / cycles if is_growing else 0.0 * growth_ahead.arc[-1]
     return replace(solves, rate=rate[None])
 
 
@@ -729,7 +757,7 @@ def _overloads_between(
     rule: GrowthRule,
     last: Step,
     rates: Rates,
-    here: Sequence[tuple[GrowthStations, SolveHistory]],
+    parts_here: Sequence[tuple[GrowthStations, SolveHistory]],
 ) -> tuple[Floats, float, OverloadZones]:
     """Growth of the stations of a step with K between that of its begin and that of its end.
 
@@ -742,28 +770,30 @@ def _overloads_between(
     """
     plan, (stations, solves) = plan_of(last), solves_of(last)
     first = _kinds(solves)
-    later, ratio = [], np.ones(len(stations))
-    for c, (part, values) in enumerate(here):
+    later_kinds, ratio = [], np.ones(len(stations))
+    for c, (part, values) in enumerate(parts_here):
         rows = np.nonzero(stations.crack == c)[0]
-        moved = (stations.x + plan.move)[rows]
-        later.append(_kinds_near(part, _kinds(values), moved, first.at(rows)))
+        moved_x = (stations.x + plan.move)[rows]
+        later_kinds.append(_kinds_near(part, _kinds(values), moved_x, first.at(rows)))
         ratio[rows] = rates.problem.sizes[c] / solves.scale[rows]
     assert last.zones is not None
-    done = _growth_ahead(
-        rule, solves, [first, _all_kinds(later)], last.zones, plan.length, ratio, np.inf
+    integration = _growth_ahead(
+        rule, solves, [first, _all_kinds(later_kinds)], last.zones, plan.length, ratio, np.inf
     )
-    rest = plan.length / done.reached if 0 < done.reached < plan.length else 1.0
-    return rest * done.arc[-1], rest * float(done.cycles[-1]), done.zones
+    rest = plan.length / integration.reached if 0 < integration.reached < plan.length else 1.0
+    return rest * integration.arc[-1], rest * float(integration.cycles[-1]), integration.zones
 
 
 def _zones_after(rule: GrowthRule, last: Step, x: Floats) -> OverloadZones:
     """What overloads have left at places that some of the stations of a step have come to."""
     plan, (stations, solves) = plan_of(last), solves_of(last)
     assert last.zones is not None
-    ones, length = np.ones(len(stations)), plan.part * plan.length
-    done = _growth_ahead(rule, solves, [_kinds(solves)], last.zones, length, ones, np.inf)
-    arc, moved = done.arc[-1], stations.x + plan.part * plan.move
-    return zones_onto(done.zones, arc, arc, moved, x)
+    ones_of_stations, length = np.ones(len(stations)), plan.part * plan.length
+    integration = _growth_ahead(
+        rule, solves, [_kinds(solves)], last.zones, length, ones_of_stations, np.inf
+    )
+    arc, moved_x = integration.arc[-1], stations.x + plan.part * plan.move
+    return zones_onto(integration.zones, arc, arc, moved_x, x)
 
 
 def rate_at_end(rate: Floats, arc: Floats, blocks: float) -> Floats:
@@ -771,13 +801,13 @@ def rate_at_end(rate: Floats, arc: Floats, blocks: float) -> Floats:
     return np.maximum(2 * arc / blocks - rate, 0.0)
 
 
-def beyond_trapezoid(blocks: float, expected: float) -> float:
+def beyond_trapezoid(blocks: float, expected_blocks: float) -> float:
     """Blocks of a step by a power of the rates at both ends, against the mean of their inverses."""
-    return abs(0.5 * (expected + blocks**2 / expected) - blocks)
+    return abs(0.5 * (expected_blocks + blocks**2 / expected_blocks) - blocks)
 
 
 def zones_onto(
-    zones: OverloadZones, arc: Floats, way: Floats, moved: Floats, x: Floats
+    zones: OverloadZones, arc: Floats, way: Floats, moved_x: Floats, x: Floats
 ) -> OverloadZones:
     """What overloads have left, at the places of the next front.
 
@@ -787,17 +817,17 @@ def zones_onto(
         At the places of the last front, after growth by `arc`.
     arc, way : (f,) arrays, length
         Growth that was marched, and the advance that the whole front made of it.
-    moved : (f, 3) array, length
+    moved_x : (f, 3) array, length
         Where these places have come to.
     x : (g, 3) array, length
         Places of the next front: each takes over from the nearest.
     """
-    if not len(moved):
+    if not len(moved_x):
         return replace(no_zones(len(x)), position=zones.position, part=zones.part)
-    within = np.minimum(zones.since, arc)
-    share = np.divide(within, arc, out=np.zeros_like(arc), where=arc > 0)
+    arc_within_zone = np.minimum(zones.since, arc)
+    share = np.divide(arc_within_zone, arc, out=np.zeros_like(arc), where=arc > 0)
     since = np.maximum(zones.since + share * (way - arc), 0.0)
-    nearest = np.linalg.norm(x[:, None] - moved, axis=2).argmin(axis=1)
+    nearest = np.linalg.norm(x[:, None] - moved_x, axis=2).argmin(axis=1)
     return replace(zones.at(nearest), since=since[nearest])
 
 
@@ -815,9 +845,9 @@ def _growth_ahead(
     dK, R, a = (np.concatenate(part) for part in arrays)
     every = BlockCycles(dK, R, a, kinds[0].sets)
     t = np.linspace(0.0, 1.0, POINTS)[:, None]
-    even = np.abs(ratio - 1) < 1e-6
-    safe = np.where(even, 2.0, ratio)
-    x = np.where(even, t, np.log1p(t * (safe - 1)) / np.log(safe))
+    is_even = np.abs(ratio - 1) < 1e-6
+    safe_ratio = np.where(is_even, 2.0, ratio)
+    x = np.where(is_even, t, np.log1p(t * (safe_ratio - 1)) / np.log(safe_ratio))
     nodes = np.repeat(np.arange(float(len(kinds)))[:, None], len(ratio), axis=1)
     return march(
         rule.law,

@@ -30,8 +30,10 @@ class Integrator(Protocol):
     def advance_of(self, step: Step, plan: Plan, rates: Rates) -> Floats:
         """Advance to the next step at the stations that were solved `(n,)`, length."""
 
-    def cycles_until(self, rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
-        """Cycles of a part of the advance after a step, of which the whole takes `after`.
+    def cycles_until(
+        self, rule: GrowthRule, step: Step, part: float, end_rate: float | None
+    ) -> float:
+        """Cycles of a part of the advance after a step, of which the whole takes `end_rate`.
 
         As the last solves see it, where no solve after it says what the whole takes.
         """

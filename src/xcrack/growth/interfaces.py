@@ -100,36 +100,36 @@ def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhe
     if not len(facets) or not length.any():
         return None
     n, number = len(x), _numbers_of_sets(rule)
-    way, behind, gap, power = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n), np.zeros(n)
-    before = np.array(elasticity.sets_at(x))
-    after, cell, is_smooth = np.array(before), cell_sizes(mesh, x), np.zeros(n, dtype=bool)
+    way, way_behind, gap, power = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n), np.zeros(n)
+    set_before = np.array(elasticity.sets_at(x))
+    set_after, cell, is_smooth = np.array(set_before), cell_sizes(mesh, x), np.zeros(n, dtype=bool)
     by_K = getattr(rule.law, "ratio", None) != "nominal"
     for i in np.nonzero(length > 0)[0].tolist():
-        ahead = move[i] / length[i]
-        most = length[i] + 3 * _GAPS[0] * cell[i]
-        hits = _hits(mesh.points[facets], x[i], ahead, most)
-        ends = np.concatenate([[0.0], hits, [most]])
-        middle = x[i] + 0.5 * (ends[1:] + ends[:-1])[:, None] * ahead
+        direction = move[i] / length[i]
+        largest_way = length[i] + 3 * _GAPS[0] * cell[i]
+        hits = _hits(mesh.points[facets], x[i], direction, largest_way)
+        ends = np.concatenate([[0.0], hits, [largest_way]])
+        middle = x[i] + 0.5 * (ends[1:] + ends[:-1])[:, None] * direction
         sets = elasticity.sets_at(middle)
         is_long = np.diff(ends) > _LEAST * cell[i]
-        begins, sets = ends[:-1][is_long], sets[is_long]
+        begin_of_part, sets = ends[:-1][is_long], sets[is_long]
         changes = np.nonzero(kinds[sets[1:]] != kinds[sets[:-1]])[0] + 1
         if not len(changes):
             continue
         first = int(changes[0])
-        way[i], before[i], after[i] = begins[first], sets[first - 1], sets[first]
-        is_smooth[i] = by_K and number[before[i]] == number[after[i]]
-        place = x[i] + (way[i] + _LEAST * cell[i]) * ahead
+        way[i], set_before[i], set_after[i] = begin_of_part[first], sets[first - 1], sets[first]
+        is_smooth[i] = by_K and number[set_before[i]] == number[set_after[i]]
+        place = x[i] + (way[i] + _LEAST * cell[i]) * direction
         cell[i] = float(cell_sizes(mesh, place[None])[0])
         gap[i] = _GAPS[int(is_smooth[i])] * cell[i]
-        room = begins[int(changes[1])] - way[i] if len(changes) > 1 else np.inf
-        behind[i] = min(gap[i], 0.5 * room)
-        if number[before[i]] != number[after[i]]:
-            beside = [x[i] + (way[i] + k * _LEAST * cell[i]) * ahead for k in (-1, 1)]
-            power[i] = _power_of_K(elasticity, *beside)
+        room = begin_of_part[int(changes[1])] - way[i] if len(changes) > 1 else np.inf
+        way_behind[i] = min(gap[i], 0.5 * room)
+        if number[set_before[i]] != number[set_after[i]]:
+            places_beside = [x[i] + (way[i] + k * _LEAST * cell[i]) * direction for k in (-1, 1)]
+            power[i] = _power_of_K(elasticity, *places_beside)
     if np.isinf(way).all():
         return None
-    return InterfacesAhead(way, behind, before, after, is_smooth, cell, gap, power)
+    return InterfacesAhead(way, way_behind, set_before, set_after, is_smooth, cell, gap, power)
 
 
 def whole_front_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhead | None:
@@ -137,10 +137,10 @@ def whole_front_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAh
 
     A front that is in several already goes on with the law of each place.
     """
-    near = interfaces_ahead(rule, x, move)
-    if near is None or len(np.unique(_kinds(rule)[near.before])) > 1:
+    interfaces = interfaces_ahead(rule, x, move)
+    if interfaces is None or len(np.unique(_kinds(rule)[interfaces.before])) > 1:
         return None
-    return near
+    return interfaces
 
 
 def _numbers_of_sets(rule: GrowthRule) -> Ints:
@@ -166,43 +166,52 @@ def _kinds(rule: GrowthRule) -> Ints:
     return np.array([every.index(each) for each in every], dtype=np.int64)
 
 
-def _hits(facets: Floats, x: Floats, ahead: Floats, most: float) -> Floats:
+def _hits(facets: Floats, x: Floats, direction: Floats, largest_way: float) -> Floats:
     """Lengths at which a straight way passes facets `(k, d, d)`, rising."""
     if len(x) == 3:
         one, two = facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0]
         normal, gap = np.cross(one, two), facets[:, 0] - x
         with np.errstate(divide="ignore", invalid="ignore"):
-            far = np.einsum("ki,ki->k", gap, normal) / (normal @ ahead)
-            place = far[:, None] * ahead - gap
+            distance = np.einsum("ki,ki->k", gap, normal) / (normal @ direction)
+            place = distance[:, None] * direction - gap
             size = np.einsum("ki,ki->k", normal, normal)
             u = np.einsum("ki,ki->k", np.cross(place, two), normal) / size
             v = np.einsum("ki,ki->k", np.cross(one, place), normal) / size
-        inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
-        return np.unique(far[inside & (far > 0) & (far < most)])
+        is_inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
+        return np.unique(distance[is_inside & (distance > 0) & (distance < largest_way)])
     start, side = facets[:, 0], facets[:, 1] - facets[:, 0]
-    gap, cross = start - x, ahead[0] * side[:, 1] - ahead[1] * side[:, 0]
+    gap, cross = start - x, direction[0] * side[:, 1] - direction[1] * side[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        far = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
-        share = (gap[:, 0] * ahead[1] - gap[:, 1] * ahead[0]) / cross
-    hit = (cross != 0) & (share >= -1e-9) & (share <= 1 + 1e-9) & (far > 0) & (far < most)
-    return np.unique(far[hit])
+        distance = (gap[:, 0] * side[:, 1] - gap[:, 1] * side[:, 0]) / cross
+        share = (gap[:, 0] * direction[1] - gap[:, 1] * direction[0]) / cross
+    hit = (
+        (cross != 0)
+        & (share >= -1e-9)
+        & (share <= 1 + 1e-9)
+        & (distance > 0)
+        & (distance < largest_way)
+    )
+    return np.unique(distance[hit])
 
 
-def _power_of_K(elasticity: Elasticity, before: Floats, behind: Floats) -> float:
+def _power_of_K(elasticity: Elasticity, place_before: Floats, place_behind: Floats) -> float:
     """Power of the distance to an interface that K goes like: above 0 before a stiffer material."""
     try:
-        material, other = elasticity.isotropic_at(before), elasticity.isotropic_at(behind)
+        material, other = (
+            elasticity.isotropic_at(place_before),
+            elasticity.isotropic_at(place_behind),
+        )
     except ProblemError:  # not isotropic
         return 0.0
     return 0.5 - singularity_at_interface(material, other)
 
 
-def singularity_at_interface(medium: Isotropic, other: Isotropic) -> float:
+def singularity_at_interface(material_at_tip: Isotropic, other: Isotropic) -> float:
     """Order λ of the stresses r^-λ at a tip on an interface, which its crack meets at right angles.
 
     Parameters
     ----------
-    medium, other : Isotropic
+    material_at_tip, other : Isotropic
         Materials of the crack, and ahead of it.
 
     Notes
@@ -218,15 +227,15 @@ def singularity_at_interface(medium: Isotropic, other: Isotropic) -> float:
     >>> round(singularity_at_interface(steel, steel), 6)
     0.5
     """
-    alpha = (other.E_prime - medium.E_prime) / (other.E_prime + medium.E_prime)
-    beta = (other.mu * (medium.kolosov - 1) - medium.mu * (other.kolosov - 1)) / (
-        other.mu * (medium.kolosov + 1) + medium.mu * (other.kolosov + 1)
+    alpha = (other.E_prime - material_at_tip.E_prime) / (other.E_prime + material_at_tip.E_prime)
+    beta = (other.mu * (material_at_tip.kolosov - 1) - material_at_tip.mu * (other.kolosov - 1)) / (
+        other.mu * (material_at_tip.kolosov + 1) + material_at_tip.mu * (other.kolosov + 1)
     )
 
     def is_above(order: float) -> bool:
-        right = 2 * (beta - alpha) / (1 + beta) * (1 - order) ** 2
-        right += (alpha + beta**2) / (1 - beta**2)
-        return bool(np.cos(np.pi * order) > right)
+        right_side = 2 * (beta - alpha) / (1 + beta) * (1 - order) ** 2
+        right_side += (alpha + beta**2) / (1 - beta**2)
+        return bool(np.cos(np.pi * order) > right_side)
 
     return sum(bisected_length(is_above, 1.0)) / 2
 
@@ -259,10 +268,10 @@ def passage(
     rule: GrowthRule,
     frame: Floats,
     solves_in: Callable[[Bools], SolveHistory],
-    near: InterfacesAhead,
+    interfaces: InterfacesAhead,
     goal: Floats,
     start: float,
-    most: float,
+    most_length: float,
     zones: OverloadZones | None,
 ) -> Passage:
     """Let ends grow, through their interfaces, until the first of them has come as far as wanted.
@@ -274,32 +283,32 @@ def passage(
         Of the ends.
     solves_in : callable (n,) array of bool -> SolveHistory
         What solves say when some ends have passed.
-    near : InterfacesAhead
+    interfaces : InterfacesAhead
     goal : (n,) array, length
         Way of each at which the passage ends; inf for those that do not end it.
-    start, most : float, length
+    start, most_length : float, length
         Of σ: where it begins, and its longest piece.
     zones : OverloadZones, optional
         Left at the begin.
     """
     n = len(goal)
-    passed, done = np.zeros(n, dtype=bool), np.zeros(n)
+    is_passed, arc_done = np.zeros(n, dtype=bool), np.zeros(n)
     cycles_at, move, total, cycles = np.full(n, np.nan), np.zeros((n, 2)), 0.0, 0.0
-    while total < most * (1 - 1e-12):
-        solves = solves_in(passed)
-        piece = stretch_of(rule, solves, start + total, most - total, zones)
-        crosses = (goal > near.way) & ~passed
-        length, row = _first_end(piece, np.where(crosses, near.way, goal) - done)
-        if length < most - total:
+    while total < most_length * (1 - 1e-12):
+        solves = solves_in(is_passed)
+        piece = stretch_of(rule, solves, start + total, most_length - total, zones)
+        is_crossing = (goal > interfaces.way) & ~is_passed
+        length, row = _first_end(piece, np.where(is_crossing, interfaces.way, goal) - arc_done)
+        if length < most_length - total:
             piece = stretch_of(rule, solves, start + total, length, zones)
         growth = piece.growth(frame, solves.angles(frame))
-        move, done = move + growth.move, done + growth.arc
+        move, arc_done = move + growth.move, arc_done + growth.arc
         cycles, total = cycles + growth.cycles, total + length
         zones = piece.zones
-        if row < 0 or not crosses[row]:
+        if row < 0 or not is_crossing[row]:
             break
-        passed[row], done[row], cycles_at[row] = True, near.way[row], cycles
-    return Passage(total, Growth(move, done, cycles), cycles_at, zones)
+        is_passed[row], arc_done[row], cycles_at[row] = True, interfaces.way[row], cycles
+    return Passage(total, Growth(move, arc_done, cycles), cycles_at, zones)
 
 
 def _first_end(piece: Stretch, target: Floats) -> tuple[float, int]:
@@ -307,41 +316,41 @@ def _first_end(piece: Stretch, target: Floats) -> tuple[float, int]:
     length, first = piece.length, -1
     for row in np.nonzero(piece.arcs()[0] >= target)[0].tolist():
 
-        def before(part: float, row: int = row) -> bool:
+        def is_before(part: float, row: int = row) -> bool:
             return bool(piece.arcs(part)[0][row] < target[row])
 
-        part = bisected_length(before, length, _SPLITS)[1]
+        part = bisected_length(is_before, length, _SPLITS)[1]
         if part < length or first < 0:
             length, first = part, row
     return length, first
 
 
 def mixed_solves(
-    before: SolveHistory, after: SolveHistory, sets: Ints, passed: Bools
+    solves_before: SolveHistory, solves_after: SolveHistory, sets: Ints, is_passed: Bools
 ) -> SolveHistory:
     """What solves say of ends of which some have passed into another set.
 
     Parameters
     ----------
-    before, after : SolveHistory
+    solves_before, solves_after : SolveHistory
         Before and behind the interfaces.
     sets : (n,) array of int
         Behind.
-    passed : (n,) array of bool
+    is_passed : (n,) array of bool
     """
-    kinds = before.kinds
-    if kinds is not None and after.kinds is not None:
+    kinds = solves_before.kinds
+    if kinds is not None and solves_after.kinds is not None:
         dK, R, a = (
-            np.where(passed.reshape(1, -1, *[1] * (two.ndim - 2)), two, one)
-            for one, two in zip(kinds.arrays, after.kinds.arrays, strict=True)
+            np.where(is_passed.reshape(1, -1, *[1] * (two.ndim - 2)), two, one)
+            for one, two in zip(kinds.arrays, solves_after.kinds.arrays, strict=True)
         )
         if kinds.sets is not None:
-            sets = np.where(passed, sets, kinds.sets)
+            sets = np.where(is_passed, sets, kinds.sets)
         kinds = BlockCycles(dK, R, a, sets)
     return replace(
-        before,
-        rate=np.where(passed, after.rate, before.rate),
-        dK_eq=np.where(passed, after.dK_eq, before.dK_eq),
+        solves_before,
+        rate=np.where(is_passed, solves_after.rate, solves_before.rate),
+        dK_eq=np.where(is_passed, solves_after.dK_eq, solves_before.dK_eq),
         kinds=kinds,
     )
 
@@ -351,19 +360,19 @@ _X, _W = np.polynomial.legendre.leggauss(24)
 
 
 def cycles_of_jump(
-    old: SolveHistory,
+    old_solves: SolveHistory,
     exponent: float,
     rate: float,
     row: int,
     way: float,
-    behind: float,
+    way_behind: float,
     power: float,
 ) -> tuple[float, float]:
     """Cycles of an end up to an interface at which K jumps, and from there to its place behind.
 
     Parameters
     ----------
-    old : SolveHistory
+    old_solves : SolveHistory
         Before it.
     exponent : float
         Of the law behind.
@@ -371,7 +380,7 @@ def cycles_of_jump(
         At the place behind.
     row : int
         Of the end.
-    way, behind : float, length
+    way, way_behind : float, length
         From the last solve to the interface, and from there.
     power : float
         As of `InterfacesAhead`.
@@ -381,35 +390,36 @@ def cycles_of_jump(
     The rate is a power of the distance to the interface times one of the size of the crack. That
     of the size follows from the last two solves before it, on both sides.
     """
-    known, scale = old.last(2), float(old.scale[row])
-    size = scale + known.sigma
-    before, after = (
-        float(np.clip(power * m, -_MOST_POWER, _MOST_POWER)) for m in (old.exponent, exponent)
+    last_solves, scale = old_solves.last(2), float(old_solves.scale[row])
+    size = scale + last_solves.sigma
+    power_before, power_after = (
+        float(np.clip(power * m, -_MOST_POWER, _MOST_POWER))
+        for m in (old_solves.exponent, exponent)
     )
-    distance = way + known.sigma[-1] - known.sigma
-    regular = known.rate[:, row] / distance**before
+    distance = way + last_solves.sigma[-1] - last_solves.sigma
+    regular_rate = last_solves.rate[:, row] / distance**power_before
     growth = 0.0
-    if len(size) > 1 and regular.min() > 0:
-        growth = float(np.log(regular[-1] / regular[0]) / np.log(size[-1] / size[0]))
-    there = size[-1] + way
+    if len(size) > 1 and regular_rate.min() > 0:
+        growth = float(np.log(regular_rate[-1] / regular_rate[0]) / np.log(size[-1] / size[0]))
+    size_there = size[-1] + way
 
     def time(length: float, at_end: float, power: float, side: float) -> float:
         # With u = (distance / length)^(1 - power) the power of the distance is gone.
         distance = length * (0.5 * (_X + 1)) ** (1 / (1 - power))
-        factor = ((there + side * length) / (there + side * distance)) ** growth
+        factor = ((size_there + side * length) / (size_there + side * distance)) ** growth
         return float(length / (at_end * (1 - power)) * (0.5 * _W @ factor))
 
-    first = time(way, float(known.rate[-1, row]), before, -1.0)
-    return first, time(behind, rate, after, 1.0)
+    first = time(way, float(last_solves.rate[-1, row]), power_before, -1.0)
+    return first, time(way_behind, rate, power_after, 1.0)
 
 
-def rates_behind(rule: GrowthRule, step: Step, near: InterfacesAhead) -> Floats:
+def rates_behind(rule: GrowthRule, step: Step, interfaces: InterfacesAhead) -> Floats:
     """Rates `(n,)` of the last solve by the laws of the materials behind interfaces."""
     if getattr(rule.law, "ratio", None) == "nominal":  # K without contact is not known any more
         return solves_of(step)[1].rate[-1]
     problem, response = scene_of(rule, step)
     with collected_warnings([]):  # they were given at the solve
-        return rates_by_law_of(rule, problem, response, near.after)
+        return rates_by_law_of(rule, problem, response, interfaces.after)
 
 
 def scene_of(rule: GrowthRule, step: Step) -> tuple[Problem, Response]:
@@ -425,34 +435,41 @@ def rates_in_set(rule: GrowthRule, problem: Problem, response: Response, number:
         return rates_by_law_of(rule, problem, response, np.full(n, number))
 
 
-def cycles_across(size: float, way: float, behind: float, before: Floats, after: Floats) -> Floats:
+def cycles_across(
+    size: float, way: float, way_behind: float, rates_before: Floats, rates_after: Floats
+) -> Floats:
     """Cycles of an end before an interface at which only laws differ, and behind it `(2,)`.
 
     Parameters
     ----------
     size : float, length
         Of the crack at first.
-    way, behind : float, length
+    way, way_behind : float, length
         To the interface, and from there.
-    before, after : (2,) arrays, length/cycle
+    rates_before, rates_after : (2,) arrays, length/cycle
         Rates at both ends of the step by the law before, and by that behind.
     """
-    ends = size + np.array([0.0, way, way + behind])
+    ends = size + np.array([0.0, way, way + way_behind])
     share = np.log(ends[1] / size) / np.log(ends[2] / size)
-    there = [rate[0] * (rate[1] / rate[0]) ** share for rate in (before, after)]
-    return cycles_between(ends[:2], ends[1:], [before[0], there[1]], [there[0], after[1]])
+    rates_there = [rate[0] * (rate[1] / rate[0]) ** share for rate in (rates_before, rates_after)]
+    return cycles_between(
+        ends[:2], ends[1:], [rates_before[0], rates_there[1]], [rates_there[0], rates_after[1]]
+    )
 
 
-def warn_of_passages(rule: GrowthRule, last: Step, near: InterfacesAhead, cycles: Floats) -> None:
+def warn_of_passages(
+    rule: GrowthRule, last: Step, interfaces: InterfacesAhead, cycles: Floats
+) -> None:
     """Say where ends pass interfaces, `cycles` `(n,)` after a step; nan where they do not."""
     stations, move = solves_of(last)[0], plan_of(last).move
     names = [name for name, _ in rule.problem.elasticity.named]
     for row in np.nonzero(np.isfinite(cycles))[0].tolist():
         name = last.end_name(int(stations.crack[row]), int(stations.front[row]))
-        x = stations.x[row] + near.way[row] * move[row] / np.linalg.norm(move[row])
+        x = stations.x[row] + interfaces.way[row] * move[row] / np.linalg.norm(move[row])
         warn(
-            f"{name} passes from {names[near.before[row]]!r} into {names[near.after[row]]!r} at "
-            f"{coordinates(x.tolist())}, N = {last.cycles + float(cycles[row]):.6g}"
+            f"{name} passes from {names[interfaces.before[row]]!r} into "
+            f"{names[interfaces.after[row]]!r} at {coordinates(x.tolist())}, "
+            f"N = {last.cycles + float(cycles[row]):.6g}"
         )
 
 

@@ -100,45 +100,58 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         return broken_plan or plan
     if len(plan.cracks) < 2:
         return plan
-    close = _close_pairs(plan.cracks, body, step.corrected)
-    facing = {pair for pair, _, _ in close}  # their fronts join; faces are those of other pairs
-    faces = [pair for pair in _faces_met(plan.cracks, body) if pair not in facing]
-    beside = [pair for pair in _pairs_beside(plan.cracks, body) if pair not in {*facing, *faces}]
-    if not close and not faces and not beside:
+    close_pairs = _close_pairs(plan.cracks, body, step.corrected)
+    facing_pairs = {
+        pair for pair, _, _ in close_pairs
+    }  # their fronts join; faces are those of other pairs
+    faces = [pair for pair in _faces_met(plan.cracks, body) if pair not in facing_pairs]
+    pairs_beside = [
+        pair for pair in _pairs_beside(plan.cracks, body) if pair not in {*facing_pairs, *faces}
+    ]
+    if not close_pairs and not faces and not pairs_beside:
         return plan
-    hindrance = _hindrance(rule) if close else ""
+    hindrance = _hindrance(rule) if close_pairs else ""
     if hindrance:
-        i, k = close[0][0]
-        raise GeometryError(f"cracks {i} and {k} meet near {at(close[0][1].x)}, and {hindrance}")
+        i, k = close_pairs[0][0]
+        raise GeometryError(
+            f"cracks {i} and {k} meet near {at(close_pairs[0][1].x)}, and {hindrance}"
+        )
     m = solves_of(step)[1].exponent
-    time, way, plain = min(
-        [_shares_at_meeting(rule, step, plan, *each, body, m) for each in close]
+    time, way, time_at_first_rate = min(
+        [_shares_at_meeting(rule, step, plan, *each, body, m) for each in close_pairs]
         + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
-        + [_met_face(rule, step, plan, *pair, body, m, True) for pair in beside]
+        + [_met_face(rule, step, plan, *pair, body, m, True) for pair in pairs_beside]
     )
-    now, part = _joined_cracks(rule, _advanced(rule, step, plan, way), facing, beside, body), 1.0
-    for less in _PARTS if now.failed else ():  # fronts that overlap may join while they are apart
-        before = _advanced(rule, step, plan, less * way)
-        sooner = _joined_cracks(rule, before, facing, [*beside, *now.failed], body)
-        if not sooner.failed:
-            now, part = sooner, less
+    joined_now, part = (
+        _joined_cracks(rule, _advanced(rule, step, plan, way), facing_pairs, pairs_beside, body),
+        1.0,
+    )
+    for lesser_part in (
+        _PARTS if joined_now.failed else ()
+    ):  # fronts that overlap may join while they are apart
+        cracks_before = _advanced(rule, step, plan, lesser_part * way)
+        joined_sooner = _joined_cracks(
+            rule, cracks_before, facing_pairs, [*pairs_beside, *joined_now.failed], body
+        )
+        if not joined_sooner.failed:
+            joined_now, part = joined_sooner, lesser_part
             break
-    if now.failure is not None:
+    if joined_now.failure is not None:
         if _pairs_beside(plan.cracks, body):
-            raise now.failure
+            raise joined_now.failure
         return plan  # beside each other by a cell or more they go on, and end on faces later
-    if not now.places:
+    if not joined_now.places:
         return plan
-    way, time, plain = part * way, part * time, part * plain
-    cycles = time * plan.cycles / _gain(step, now.apart, rule.problem.mesh, m)
-    unsure = UNKNOWN[3] * abs(plain * plan.cycles - cycles)
-    joins = [
+    way, time, time_at_first_rate = part * way, part * time, part * time_at_first_rate
+    cycles = time * plan.cycles / _gain(step, joined_now.apart, rule.problem.mesh, m)
+    cycle_error = UNKNOWN[3] * abs(time_at_first_rate * plan.cycles - cycles)
+    joins_of_step = [
         Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), pair)
-        for pair, x in now.places
+        for pair, x in joined_now.places
     ]
     return replace(
-        plan, part=way, cycles=cycles, error=unsure, cracks=tuple(now.cracks),
-        apart=tuple(now.apart), joins=tuple(joins),
+        plan, part=way, cycles=cycles, error=cycle_error, cracks=tuple(joined_now.cracks),
+        apart=tuple(joined_now.apart), joins=tuple(joins_of_step),
     )  # fmt: skip
 
 
@@ -167,46 +180,55 @@ class _Joined:
 
 def _joined_cracks(
     rule: GrowthRule,
-    apart: Sequence[Crack],
-    facing: Collection[tuple[int, int]],
-    beside: Sequence[tuple[int, int]],
+    cracks_apart: Sequence[Crack],
+    facing_pairs: Collection[tuple[int, int]],
+    pairs_beside: Sequence[tuple[int, int]],
     body: Body,
 ) -> _Joined:
     """Cracks of which some become arms on faces ahead of them, and others one; see `with_joins`."""
-    now, places, failed = list(apart), [], []
-    ahead = [(min(met.crack, met.on), max(met.crack, met.on)) for met in _faces_near(now, body)]
-    steep = set(facing)  # and those of which neither can be an arm: their fronts join if they can
-    for pair in dict.fromkeys([*ahead, *beside]):
-        if pair in facing or may_touch(now, *pair):
+    cracks_now, places, failed_pairs = list(cracks_apart), [], []
+    pairs_ahead = [
+        (min(face_near.crack, face_near.on), max(face_near.crack, face_near.on))
+        for face_near in _faces_near(cracks_now, body)
+    ]
+    steep_pairs = set(
+        facing_pairs
+    )  # and those of which neither can be an arm: their fronts join if they can
+    for pair in dict.fromkeys([*pairs_ahead, *pairs_beside]):
+        if pair in facing_pairs or may_touch(cracks_now, *pair):
             continue
-        arm = _with_arm(rule, now, pair, body)
+        arm = _with_arm(rule, cracks_now, pair, body)
         if arm is None or not arm[2]:
-            if _steep_pairs(now, [pair], body) and not _hindrance(rule):
-                steep.add(pair)
+            if _steep_pairs(cracks_now, [pair], body) and not _hindrance(rule):
+                steep_pairs.add(pair)
                 continue
-            failed.append(pair)
+            failed_pairs.append(pair)
         if arm is not None:
-            now = arm[0]
+            cracks_now = arm[0]
             places.append((pair, arm[1]))
-    number = list(range(len(now)))
-    while pairs := _close_pairs(now, body) + _steep_pairs(now, _numbers(steep, number), body):
+    number = list(range(len(cracks_now)))
+    while pairs := _close_pairs(cracks_now, body) + _steep_pairs(
+        cracks_now, _numbers(steep_pairs, number), body
+    ):
         (i, k), gap, size = pairs[0]
-        other = now[k] if gap.turn > 0 else turned_crack(now[k])
-        across = STEP * size if gap.offset > OFFSET * size else 0.0
-        radius, met = max(_RADIUS * size, _WIDER * gap.width), (number[i], number[k])
+        other = cracks_now[k] if gap.turn > 0 else turned_crack(cracks_now[k])
+        lateral_step = STEP * size if gap.offset > OFFSET * size else 0.0
+        radius, pair_met = max(_RADIUS * size, _WIDER * gap.width), (number[i], number[k])
         try:
-            now[i] = merged_crack(now[i], other, radius, _SPACING * size, across, body)
+            cracks_now[i] = merged_crack(
+                cracks_now[i], other, radius, _SPACING * size, lateral_step, body
+            )
         except GeometryError as failure:  # of tilted fronts whose gap has no outline one is an arm
-            arm = _with_arm(rule, now, (i, k), body) if abs(gap.turn) < _FLAT else None
+            arm = _with_arm(rule, cracks_now, (i, k), body) if abs(gap.turn) < _FLAT else None
             if arm is None:
-                return _Joined(apart, now, places, [*failed, met], failure)
-            now = arm[0]
-            failed += [] if arm[2] else [met]
+                return _Joined(cracks_apart, cracks_now, places, [*failed_pairs, pair_met], failure)
+            cracks_now = arm[0]
+            failed_pairs += [] if arm[2] else [pair_met]
         else:
-            now = renumbered_arms(now, i, k, gap.turn > 0)
+            cracks_now = renumbered_arms(cracks_now, i, k, gap.turn > 0)
             del number[k]
-        places.append((met, gap.x))
-    return _Joined(apart, now, places, failed)
+        places.append((pair_met, gap.x))
+    return _Joined(cracks_apart, cracks_now, places, failed_pairs)
 
 
 # Fronts of one crack: those that close around a ligament, and those that come to face each other.
@@ -216,26 +238,27 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
     """A plan in which a ligament inside one crack breaks within its advance; None without one."""
     inner = _inner_front(step, plan, body)
     if inner is None:
-        facing = _facing_share(rule, step, plan, body)
-        if facing is None:
+        facing_share = _facing_share(rule, step, plan, body)
+        if facing_share is None:
             return None
-        c, way, gap = facing
-        apart = _advanced(rule, step, plan, way)
-        crack = with_own_gap_closed(apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
+        c, way, gap = facing_share
+        cracks_apart = _advanced(rule, step, plan, way)
+        crack = with_own_gap_closed(cracks_apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
         x, time = gap.x, way
     else:
         c, f, time = inner
         stations = solves_of(step)[0]
         moves = (stations.crack != c) | (stations.front != f)
         arc = np.where(moves, time * plan.arc, 0.0)
-        apart = _INTEGRATORS[rule.integrator].advanced(rule, step, arc)
-        crack, x = without_inner_front(apart[c], f)
-    now = [crack if k == c else other for k, other in enumerate(apart)]
+        cracks_apart = _INTEGRATORS[rule.integrator].advanced(rule, step, arc)
+        crack, x = without_inner_front(cracks_apart[c], f)
+    cracks_now = [crack if k == c else other for k, other in enumerate(cracks_apart)]
     cycles = time * plan.cycles
     join = Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), (c, c))
     return replace(
-        plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN[3] * cycles, cracks=tuple(now),
-        apart=tuple(apart), joins=(join,), limit="", refusal="",
+        plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN[3] * cycles,
+        cracks=tuple(cracks_now),
+        apart=tuple(cracks_apart), joins=(join,), limit="", refusal="",
     )  # fmt: skip
 
 
@@ -249,11 +272,11 @@ def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] |
         for f, front in enumerate(front_frames(crack)):
             if not front.closed or len(crack.fronts or ()) < 2:
                 continue
-            away = front.x.mean(axis=0) - front.x
-            if np.einsum("ij,ij->i", away, front.frame[:, 0]).mean() <= 0:
+            outward_way = front.x.mean(axis=0) - front.x
+            if np.einsum("ij,ij->i", outward_way, front.frame[:, 0]).mean() <= 0:
                 continue
             rows = (stations.crack == c) & (stations.front == f)
-            radius = float(np.linalg.norm(away, axis=1).max())
+            radius = float(np.linalg.norm(outward_way, axis=1).max())
             way = float(plan.arc[rows].mean()) if rows.any() else 0.0
             cell = float(body.cell_size(front.x).mean())
             if radius - way < _LIGAMENT * cell and way > 0:
@@ -267,30 +290,30 @@ def _facing_share(
     """Crack whose fronts come to face each other, the share of the advance, and the gap then."""
 
     def nearest_gap(share: float) -> tuple[int, OwnGap] | None:
-        now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
-        gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(now)]
+        cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(cracks_now)]
         open_gaps = [(c, gap) for c, gap in gaps if gap is not None]
         return min(open_gaps, key=lambda each: each[1].width, default=None)
 
     if not plan.limit:
-        met = nearest_gap(1.0)
-        if met is None:
+        gap_met = nearest_gap(1.0)
+        if gap_met is None:
             return None
-        if met[1].width > _LEFT * met[1].size:
-            return met[0], 1.0, met[1]
+        if gap_met[1].width > _LEFT * gap_met[1].size:
+            return gap_met[0], 1.0, gap_met[1]
     elif _OWN not in plan.refusal:
         return None
     low, high = 0.0, 1.0
     for _ in range(_TRIES):
         share = 0.5 * (low + high)
         try:
-            met = nearest_gap(share)
+            gap_met = nearest_gap(share)
         except GeometryError:
             high = share
             continue
-        if met is not None and met[1].width > _LEFT * met[1].size:
-            return met[0], share, met[1]
-        low, high = (low, share) if met is not None else (share, high)
+        if gap_met is not None and gap_met[1].width > _LEFT * gap_met[1].size:
+            return gap_met[0], share, gap_met[1]
+        low, high = (low, share) if gap_met is not None else (share, high)
     return None
 
 
@@ -300,10 +323,10 @@ def _advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Cra
 
 def joined(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """A step whose cracks have just joined: growth begins anew, after the cycles so far."""
-    mesh, before = rates.problem.mesh, 0.0 if last.error is None else last.error.cycles
+    mesh, cycles_before = rates.problem.mesh, 0.0 if last.error is None else last.error.cycles
     plan = plan_of(last)
     place = tuple(_errors(last, sif.x, mesh) for sif in rates.sif[0])
-    error = StepError(place, before + plan.error)
+    error = StepError(place, cycles_before + plan.error)
     return _INTEGRATORS[rule.integrator].begin_at(
         rule, rates, identities, last.cycles + plan.cycles, error, last
     )
@@ -311,12 +334,12 @@ def joined(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -
 
 def _faces_near(cracks: Sequence[Crack], body: Body) -> list[FaceAhead]:
     """Faces of others close ahead of fronts, nearest first."""
-    near = [
+    faces_near = [
         face_ahead(cracks, c, on, body, _AHEAD)
         for c, on in permutations(range(len(cracks)), 2)
         if not may_touch(cracks, c, on)
     ]
-    return sorted([each for each in near if each is not None], key=lambda each: each.width)
+    return sorted([each for each in faces_near if each is not None], key=lambda each: each.width)
 
 
 def _faces_met(cracks: Sequence[Crack], body: Body) -> list[tuple[int, int]]:
@@ -342,16 +365,19 @@ def _with_arm(
     can cut.
     """
     first = None
-    for met, face in _arms_to_be(cracks, pair, body):
+    for face_met, face in _arms_to_be(cracks, pair, body):
         try:
-            now = _led_through(cracks, met, face, body)
-            first = (now, met.x, False) if first is None and face is None else first
-            if face is not None and _lead(cracks[met.on], now[met.on], body) > _BREAKS:
+            cracks_now = _led_through(cracks, face_met, face, body)
+            first = (cracks_now, face_met.x, False) if first is None and face is None else first
+            if (
+                face is not None
+                and _lead(cracks[face_met.on], cracks_now[face_met.on], body) > _BREAKS
+            ):
                 continue
-            discretise(replace(rule.problem, cracks=tuple(now)))
+            discretise(replace(rule.problem, cracks=tuple(cracks_now)))
         except GeometryError:
             continue
-        return now, met.x, True
+        return cracks_now, face_met.x, True
     return first
 
 
@@ -382,10 +408,10 @@ def _arms_to_be(
 ) -> Iterator[tuple[FaceAhead, Crack | None]]:
     """Faces ahead of the fronts of either of two cracks; then those of fronts that are led on."""
     both = (pair, pair[::-1])
-    met = [face_ahead(cracks, c, on, body, _AHEAD) for c, on in both]
-    yield from ((one, None) for one in sorted(filter(None, met), key=lambda one: one.width))
-    beside = (_face_beside(cracks, c, on, body) for c, on in both)
-    yield from (each[1:] for each in sorted(filter(None, beside), key=lambda each: each[0]))
+    faces_met = [face_ahead(cracks, c, on, body, _AHEAD) for c, on in both]
+    yield from ((one, None) for one in sorted(filter(None, faces_met), key=lambda one: one.width))
+    faces_beside = (_face_beside(cracks, c, on, body) for c, on in both)
+    yield from (each[1:] for each in sorted(filter(None, faces_beside), key=lambda each: each[0]))
 
 
 def _face_beside(
@@ -395,50 +421,54 @@ def _face_beside(
     face = face_led_on(cracks, c, on, body, _LEAD, _SPACING)
     if face is None:
         return None
-    now = [face if number == on else crack for number, crack in enumerate(cracks)]
-    met = face_ahead(now, c, on, body, _ACROSS)
-    if met is None:
+    cracks_now = [face if number == on else crack for number, crack in enumerate(cracks)]
+    face_met = face_ahead(cracks_now, c, on, body, _ACROSS)
+    if face_met is None:
         return None
     tree = triangle_tree(cracks[on].points, cracks[on].faces)
-    return float(closest_in(tree, met.x[None]).distance[0]), met, face
+    return float(closest_in(tree, face_met.x[None]).distance[0]), face_met, face
 
 
 def _led_through(
-    cracks: Sequence[Crack], met: FaceAhead, face: Crack | None, body: Body
+    cracks: Sequence[Crack], face_met: FaceAhead, face: Crack | None, body: Body
 ) -> list[Crack]:
     """Cracks of which one has been led through the face of another one, and ends there.
 
     Parameters
     ----------
     cracks : sequence of Crack
-    met : FaceAhead
+    face_met : FaceAhead
     face : Crack or None
         That one with its front led on before the other: of it as much stays as the arm needs.
     body : Body
     """
-    now, reach = list(cracks), _AHEAD
+    cracks_now, reach = list(cracks), _AHEAD
     if face is not None:
-        now[met.on], reach = face, met.width / met.leg + _NARROW
-    now[met.crack] = led_through(now, met.crack, met.on, body, reach, _SPACING)
+        cracks_now[face_met.on], reach = face, face_met.width / face_met.leg + _NARROW
+    cracks_now[face_met.crack] = led_through(
+        cracks_now, face_met.crack, face_met.on, body, reach, _SPACING
+    )
     if face is not None:
-        line = crossings(now[met.crack], face)
+        line = crossings(cracks_now[face_met.crack], face)
         line = line[body.contains(line)]
-        now[met.on] = with_room(cracks, met.crack, met.on, body, _ROOM, _SPACING, line)
-    now[met.crack] = place_arm(now, met.crack, body.mesh)
-    host = with_room(now, met.crack, met.on, body, _ROOM, _SPACING)
-    if face is not None or host is not now[met.on]:
-        now[met.on] = host
-        now = place_arms(now, body.mesh)
-    return now
+        cracks_now[face_met.on] = with_room(
+            cracks, face_met.crack, face_met.on, body, _ROOM, _SPACING, line
+        )
+    cracks_now[face_met.crack] = place_arm(cracks_now, face_met.crack, body.mesh)
+    host = with_room(cracks_now, face_met.crack, face_met.on, body, _ROOM, _SPACING)
+    if face is not None or host is not cracks_now[face_met.on]:
+        cracks_now[face_met.on] = host
+        cracks_now = place_arms(cracks_now, body.mesh)
+    return cracks_now
 
 
-def _lead(old: Crack, new: Crack, body: Body) -> float:
+def _lead(old_crack: Crack, new_crack: Crack, body: Body) -> float:
     """Farthest way of new points of a crack from what it was, in cells."""
-    x = new.points[len(old.points) :]
+    x = new_crack.points[len(old_crack.points) :]
     if not len(x):
         return 0.0
-    away = closest_in(triangle_tree(old.points, old.faces), x).distance
-    return float((away / body.cell_size(x)).max())
+    distance = closest_in(triangle_tree(old_crack.points, old_crack.faces), x).distance
+    return float((distance / body.cell_size(x)).max())
 
 
 def _pairs_beside(cracks: Sequence[Crack], body: Body) -> list[tuple[int, int]]:
@@ -458,7 +488,7 @@ def _met_face(
     k: int,
     body: Body,
     exponent: float,
-    beside: bool = False,
+    is_beside: bool = False,
 ) -> tuple[float, float, float]:
     """When a front has met the face of another crack, in shares of an advance; as of `_met`.
 
@@ -467,30 +497,34 @@ def _met_face(
     """
 
     def face_after(share: float, reach: float) -> FaceAhead | None:
-        now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
-        if _cross(now, i, k, body):
+        cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        if _cross(cracks_now, i, k, body):
             return FaceAhead(i, k, 0.0, 1.0, np.zeros(3))
-        if beside:
-            ahead = (_face_beside(now, *pair, body) for pair in ((i, k), (k, i)))
-            nearest = min(filter(None, ahead), key=lambda each: each[0], default=None)
+        if is_beside:
+            faces_ahead = (_face_beside(cracks_now, *pair, body) for pair in ((i, k), (k, i)))
+            nearest = min(filter(None, faces_ahead), key=lambda each: each[0], default=None)
             return None if nearest is None else nearest[1]
-        both = [face_ahead(now, *pair, body, reach) for pair in ((i, k), (k, i))]
+        both = [face_ahead(cracks_now, *pair, body, reach) for pair in ((i, k), (k, i))]
         return min(
             (one for one in both if one is not None), key=lambda one: one.width, default=None
         )
 
-    low, high, met = 0.0, 1.0, face_after(1.0, _AHEAD)
-    while met is not None and met.width > _LEFT * met.leg and high * plan.largest < met.leg:
-        low, high = high, high + met.leg / plan.largest
-        met = face_after(high, _AHEAD)
+    low, high, face_met = 0.0, 1.0, face_after(1.0, _AHEAD)
+    while (
+        face_met is not None
+        and face_met.width > _LEFT * face_met.leg
+        and high * plan.largest < face_met.leg
+    ):
+        low, high = high, high + face_met.leg / plan.largest
+        face_met = face_after(high, _AHEAD)
     way = high
-    if met is not None and met.width <= _LEFT * met.leg:
+    if face_met is not None and face_met.width <= _LEFT * face_met.leg:
         for _ in range(_TRIES):
             way = 0.5 * (low + high)
-            near = face_after(way, _AHEAD)
-            if near is not None and near.width <= 0.5 * _LEFT * near.leg:
+            face_near = face_after(way, _AHEAD)
+            if face_near is not None and face_near.width <= 0.5 * _LEFT * face_near.leg:
                 high = way
-            elif near is None or near.width > _LEFT * near.leg:
+            elif face_near is None or face_near.width > _LEFT * face_near.leg:
                 low = way
             else:
                 break
@@ -498,14 +532,14 @@ def _met_face(
             way = low
     last = face_after(way, _AHEAD)
     rest = 0.0 if last is None else last.width / plan.largest
-    plain = way + rest
+    whole_way = way + rest
     c = i if last is None else last.crack
-    gap = plain * plan.largest
-    return plain * part_of_time(gap / step.sizes[c], exponent, 3), way, plain
+    gap = whole_way * plan.largest
+    return whole_way * part_of_time(gap / step.sizes[c], exponent, 3), way, whole_way
 
 
 def _close_pairs(
-    cracks: Sequence[Crack], body: Body, before: Sequence[Crack] = ()
+    cracks: Sequence[Crack], body: Body, cracks_before: Sequence[Crack] = ()
 ) -> list[tuple[tuple[int, int], FrontGap, float]]:
     """Pairs of cracks in one surface whose fronts are too close to be solved, nearest first.
 
@@ -525,7 +559,7 @@ def _close_pairs(
         size = float(body.cell_size(gap.x[None])[0])
         if gap.width >= _NEAR * size or not gap.in_surface(size):
             continue
-        if gap.faces if not before else _is_facing(before[i], before[k], body):
+        if gap.faces if not cracks_before else _is_facing(cracks_before[i], cracks_before[k], body):
             result.append(((i, k), gap, size))
     return sorted(result, key=lambda each: each[1].width / each[2])
 
@@ -540,7 +574,7 @@ def _shares_at_meeting(
     step: Step,
     plan: Plan,
     pair: tuple[int, int],
-    near: FrontGap,
+    gap_near: FrontGap,
     size: float,
     body: Body,
     exponent: float,
@@ -556,36 +590,36 @@ def _shares_at_meeting(
         Until they have met.
     way : float
         Up to which they advance: some of the gap stays, to be closed at once.
-    plain : float
+    way_of_gap : float
         Time at the rates of the beginning.
     """
     i, k = pair
     # Over an offset a wider gap is closed: of half a cell, or half as wide as a high step.
-    high = near.offset / size
+    high = gap_near.offset / size
     share_left = float(np.clip(high, _LEFT, max(OFFSET, _STEEP * high)))
     way = _share(rule, step, plan, pair, size, share_left, body)
     first = gap_between(step.corrected[i], step.corrected[k], body, np.inf)
-    gap, left = (0.0 if first is None else first.width), share_left * size
-    if gap <= left:
+    gap, gap_left = (0.0 if first is None else first.width), share_left * size
+    if gap <= gap_left:
         return way, way, way
     # What is left over a step breaks at once: its cycles would be those of fronts that pass.
-    beyond = left - _LEFT * size
-    gap, left = gap - beyond, left - beyond
+    gap_beyond = gap_left - _LEFT * size
+    gap, gap_left = gap - gap_beyond, gap_left - gap_beyond
     a = 2 * float(np.mean([step.sizes[c] for c in pair]))  # of a penny: its radius
-    plain = way * gap / (gap - left)
-    time = plain * part_of_time(gap / a, exponent, 3)
-    most = way * (gap - _MOST * size) / (gap - left)
-    return time, min(way, max(time, most)), plain
+    way_of_gap = way * gap / (gap - gap_left)
+    time = way_of_gap * part_of_time(gap / a, exponent, 3)
+    longest_way = way * (gap - _MOST * size) / (gap - gap_left)
+    return time, min(way, max(time, longest_way)), way_of_gap
 
 
-def _gain(step: Step, now: Sequence[Crack], mesh: Mesh, exponent: float) -> float:
+def _gain(step: Step, cracks_now: Sequence[Crack], mesh: Mesh, exponent: float) -> float:
     """Mean rate of an advance over that at its beginning, of the crack that grows most.
 
     As in `elapsed_3d`: K goes with the root of the size.
     """
     gains = []
-    for c, old in enumerate(step.sizes):
-        x = np.log(crack_size(now, c, mesh) / old)
+    for c, old_size in enumerate(step.sizes):
+        x = np.log(crack_size(cracks_now, c, mesh) / old_size)
         gains.append(float(exprel(x) / exprel(x - exponent / 2 * x)))
     return max(gains)
 
@@ -596,27 +630,27 @@ def _share(
     plan: Plan,
     pair: tuple[int, int],
     size: float,
-    left: float,
+    gap_left: float,
     body: Body,
 ) -> float:
-    """Share of an advance after which a gap is closed but for `left` cells.
+    """Share of an advance after which a gap is closed but for `gap_left` cells.
 
     At most the whole advance, or one of a cell where that is longer: what is left then is less
     than a cell wide, or the fronts do not come closer.
     """
-    most = max(1.0, size / plan.largest)
+    largest_share = max(1.0, size / plan.largest)
     i, k = pair
 
     def excess(share: float) -> float:
-        now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
-        gap = gap_between(now[i], now[k], body, 10 * size + 2 * share * plan.largest)
-        return np.inf if gap is None else gap.width / size - left
+        cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        gap = gap_between(cracks_now[i], cracks_now[k], body, 10 * size + 2 * share * plan.largest)
+        return np.inf if gap is None else gap.width / size - gap_left
 
     low, at_low = 0.0, excess(0.0)
     high, at_high = 1.0, excess(1.0)
-    while at_high > 0 and high < most:
+    while at_high > 0 and high < largest_share:
         low, at_low = high, at_high
-        high = min(2 * high, most)
+        high = min(2 * high, largest_share)
         at_high = excess(high)
     if at_high > 0 or not np.isfinite(at_low):
         return high
@@ -624,7 +658,7 @@ def _share(
         return 0.0
     for _ in range(_TRIES):
         # Where fronts overlap the gap is zero and says nothing of how far: then halve.
-        part = at_low / (at_low - at_high) if at_high > -0.99 * left else 0.5
+        part = at_low / (at_low - at_high) if at_high > -0.99 * gap_left else 0.5
         share = low + part * (high - low)
         value = excess(share)
         if abs(value) < _WITHIN:
@@ -641,12 +675,14 @@ def _errors(last: Step, x: Floats, mesh: Mesh) -> Floats:
     result = np.zeros(len(x))
     for c, crack in enumerate(last.cracks):
         place = None if last.error is None else last.error.place[c]
-        old = last.sif[0][c]
-        if place is None or not len(old.x):
+        old_sif = last.sif[0][c]
+        if place is None or not len(old_sif.x):
             continue
-        reach = _REACH * float(cell_sizes(mesh, old.x).mean())
-        near = interpolate_along_front(old.x, old.front, closed_fronts(crack), place, x, reach)
-        result = np.maximum(result, np.nan_to_num(near))
+        reach = _REACH * float(cell_sizes(mesh, old_sif.x).mean())
+        error_nearby = interpolate_along_front(
+            old_sif.x, old_sif.front, closed_fronts(crack), place, x, reach
+        )
+        result = np.maximum(result, np.nan_to_num(error_nearby))
     return result
 
 

@@ -48,16 +48,18 @@ class LevelTable:
     def at(self, factors: Floats) -> Floats:
         """K for some factors `(k,)`: `(k, f, 2 or 3)`; at a level the solved one, to the bit."""
         n = len(self.levels)
-        left = np.clip(np.searchsorted(self.levels, factors, side="right") - 1, 0, n - 2)
+        left_level = np.clip(np.searchsorted(self.levels, factors, side="right") - 1, 0, n - 2)
         if self.is_smooth and n > 2:
             result = np.asarray(PchipInterpolator(self.levels, self.K, axis=0)(factors))
         else:
-            share = (factors - self.levels[left]) / (self.levels[left + 1] - self.levels[left])
-            low, high = self.K[left], self.K[left + 1]
+            share = (factors - self.levels[left_level]) / (
+                self.levels[left_level + 1] - self.levels[left_level]
+            )
+            low, high = self.K[left_level], self.K[left_level + 1]
             result = low + share[:, None, None] * (high - low)
-        nearest = left + (factors == self.levels[left + 1])
-        solved = factors == self.levels[nearest]
-        result[solved] = self.K[nearest[solved]]
+        nearest = left_level + (factors == self.levels[left_level + 1])
+        is_solved = factors == self.levels[nearest]
+        result[is_solved] = self.K[nearest[is_solved]]
         return result
 
 
@@ -96,40 +98,48 @@ def refined_response(
     block there by more than a quarter of the tolerance, of that of the fastest place.
     """
     low, high = float(first[0]), float(first[-1])
-    earlier = [x for x in reuse.levels if low <= x <= high]
-    solved: dict[float, LevelResponse] = {}
+    earlier_levels = [x for x in reuse.levels if low <= x <= high]
+    solved_levels: dict[float, LevelResponse] = {}
     handed_on = reuse
 
     def solve_at(factors: Sequence[float]) -> SolverState:
-        new = sorted(set(factors) - set(solved))
-        if not new:
+        new_levels = sorted(set(factors) - set(solved_levels))
+        if not new_levels:
             return handed_on
-        start = handed_on if not solved else _with_nearest_sets(handed_on, solved, new)
-        response = solve(states_of(spectrum, np.array(new)), start)
-        for row, factor in enumerate(new):
-            solved[factor] = LevelResponse(response, row)
+        start = (
+            handed_on
+            if not solved_levels
+            else _with_nearest_sets(handed_on, solved_levels, new_levels)
+        )
+        response = solve(states_of(spectrum, np.array(new_levels)), start)
+        for row, factor in enumerate(new_levels):
+            solved_levels[factor] = LevelResponse(response, row)
         return response.reuse
 
-    handed_on = solve_at([*first.tolist(), *earlier])
+    handed_on = solve_at([*first.tolist(), *earlier_levels])
     levels = first.tolist()
-    active = np.ones(len(levels) - 1, dtype=bool)
-    if not any(each.response.may_bend for each in solved.values()):
-        active[:] = False  # no crack has contact in any state: its gaps are lines over the factor
+    is_active = np.ones(len(levels) - 1, dtype=bool)
+    if not any(each.response.may_bend for each in solved_levels.values()):
+        is_active[:] = (
+            False  # no crack has contact in any state: its gaps are lines over the factor
+        )
     ends = _ends(spectrum, low, high)
-    while active.any() and len(levels) < _MOST:
-        numbers = np.nonzero(active)[0][: _MOST - len(levels)]
+    while is_active.any() and len(levels) < _MOST:
+        numbers = np.nonzero(is_active)[0][: _MOST - len(levels)]
         middle = [0.5 * (levels[k] + levels[k + 1]) for k in numbers]
         handed_on = solve_at(middle)
-        matters = _levels_that_matter(spectrum, solved, levels, numbers, middle, ends)
-        bent = {m for m, off in zip(middle, matters) if off}
+        is_relevant = _levels_that_matter(spectrum, solved_levels, levels, numbers, middle, ends)
+        levels_of_bend = {m for m, is_off in zip(middle, is_relevant) if is_off}
         levels = sorted([*levels, *middle])
-        active = np.array([a in bent or b in bent for a, b in zip(levels, levels[1:])])
-    every = [solved[factor] for factor in sorted(solved)]
+        is_active = np.array(
+            [a in levels_of_bend or b in levels_of_bend for a, b in zip(levels, levels[1:])]
+        )
+    every = [solved_levels[factor] for factor in sorted(solved_levels)]
     return Response(
         tuple(each.response.states[each.row] for each in every),
         tuple(each.sif for each in every),
         tuple(each.response.solutions[each.row] for each in every if each.response.solutions),
-        replace(_with_nearest_sets(handed_on, solved, levels), levels=tuple(levels)),
+        replace(_with_nearest_sets(handed_on, solved_levels, levels), levels=tuple(levels)),
     )
 
 
@@ -141,32 +151,37 @@ def states_of(spectrum: Spectrum, factors: Floats) -> list[float | LoadLevel]:
 
 
 def _with_nearest_sets(
-    reuse: SolverState, solved: dict[float, LevelResponse], factors: Sequence[float]
+    reuse: SolverState, solved_levels: dict[float, LevelResponse], factors: Sequence[float]
 ) -> SolverState:
     """The same with the closed sets of the factors that are nearest to some others."""
-    known = np.array(sorted(solved))
-    near = [solved[float(known[np.abs(known - factor).argmin()])] for factor in factors]
-    active: list[Bools | None] = []
+    known_levels = np.array(sorted(solved_levels))
+    nearest_levels = [
+        solved_levels[float(known_levels[np.abs(known_levels - factor).argmin()])]
+        for factor in factors
+    ]
+    closed_sets: list[Bools | None] = []
     for c in range(len(reuse.centre)):
-        sets = [each.response.reuse.active[c] for each in near]
-        rows = [part[each.row] for part, each in zip(sets, near) if part is not None]
-        active.append(np.stack(rows) if len(rows) == len(near) else None)
-    centre = tuple(x if a is not None else None for x, a in zip(reuse.centre, active))
-    return replace(reuse, centre=centre, active=tuple(active))
+        sets = [each.response.reuse.active[c] for each in nearest_levels]
+        rows = [part[each.row] for part, each in zip(sets, nearest_levels) if part is not None]
+        closed_sets.append(np.stack(rows) if len(rows) == len(nearest_levels) else None)
+    centre = tuple(x if a is not None else None for x, a in zip(reuse.centre, closed_sets))
+    return replace(reuse, centre=centre, active=tuple(closed_sets))
 
 
 def _ends(spectrum: Spectrum, low: float, high: float) -> tuple[Floats, Ints, Floats]:
     """Even factors, both ends of the kinds of cycles among them `(2, p)`, and how often."""
     values, count, _ = distinct_cycles(spectrum.cycles)
     rows = np.rint((values - low) / (high - low) * (_POINTS - 1)).astype(np.int64)
-    pairs, which = np.unique(rows, axis=0, return_inverse=True)
-    number = np.bincount(which.reshape(-1), weights=count, minlength=len(pairs)).astype(float)
+    pairs, number_of_pair = np.unique(rows, axis=0, return_inverse=True)
+    number = np.bincount(number_of_pair.reshape(-1), weights=count, minlength=len(pairs)).astype(
+        float
+    )
     return np.linspace(low, high, _POINTS), pairs.T, number
 
 
 def _levels_that_matter(
     spectrum: Spectrum,
-    solved: dict[float, LevelResponse],
+    solved_levels: dict[float, LevelResponse],
     levels: Sequence[float],
     numbers: Ints,
     middle: Sequence[float],
@@ -174,29 +189,33 @@ def _levels_that_matter(
 ) -> Bools:
     """Middles `(k,)` at which K of some place is off, so that growth of a block changes."""
     factors, pairs, count = ends
-    more = sorted([*levels, *middle])
-    solved_K = [np.stack([solved[x].sif[c].K for x in more]) for c in _cracks(solved)]
-    off = np.zeros((len(middle), 0))
-    changed, grown = np.zeros((len(middle), 0)), np.zeros(0)
-    old = np.isin(more, levels)
+    all_levels = sorted([*levels, *middle])
+    solved_K = [
+        np.stack([solved_levels[x].sif[c].K for x in all_levels]) for c in _cracks(solved_levels)
+    ]
+    relative_error = np.zeros((len(middle), 0))
+    change, growth = np.zeros((len(middle), 0)), np.zeros(0)
+    is_old = np.isin(all_levels, levels)
     for K in solved_K:
         if K.shape[1] == 0:
             continue
-        before = LevelTable(np.array(levels), K[old], is_smooth=True)
-        after = LevelTable(np.array(more), K, is_smooth=True)
+        table_before = LevelTable(np.array(levels), K[is_old], is_smooth=True)
+        table_after = LevelTable(np.array(all_levels), K, is_smooth=True)
         largest = max(float(np.abs(K).max()), np.finfo(float).tiny)
-        error = np.abs(K[~old] - before.at(np.array(middle))).max(axis=2) / largest
-        one, two = (_growths(ladder, factors, pairs, count) for ladder in (before, after))
+        error = np.abs(K[~is_old] - table_before.at(np.array(middle))).max(axis=2) / largest
+        one, two = (
+            _growths(ladder, factors, pairs, count) for ladder in (table_before, table_after)
+        )
         difference = np.abs(two - one)
         rows = []
         for k in numbers:
-            inside = (factors > levels[k]) & (factors < levels[k + 1])
-            rows.append(difference[inside[pairs].any(axis=0)].sum(axis=0))
-        off = np.concatenate([off, error], axis=1)
-        changed = np.concatenate([changed, np.array(rows).reshape(len(middle), -1)], axis=1)
-        grown = np.concatenate([grown, two.sum(axis=0)])
-    least = _GROWTH * spectrum.tolerance * float(grown.max(initial=0.0))
-    return np.asarray(((off > spectrum.tolerance) & (changed > least)).any(axis=1))
+            is_inside = (factors > levels[k]) & (factors < levels[k + 1])
+            rows.append(difference[is_inside[pairs].any(axis=0)].sum(axis=0))
+        relative_error = np.concatenate([relative_error, error], axis=1)
+        change = np.concatenate([change, np.array(rows).reshape(len(middle), -1)], axis=1)
+        growth = np.concatenate([growth, two.sum(axis=0)])
+    least_change = _GROWTH * spectrum.tolerance * float(growth.max(initial=0.0))
+    return np.asarray(((relative_error > spectrum.tolerance) & (change > least_change)).any(axis=1))
 
 
 def _growths(ladder: LevelTable, factors: Floats, pairs: Ints, count: Floats) -> Floats:
@@ -206,8 +225,8 @@ def _growths(ladder: LevelTable, factors: Floats, pairs: Ints, count: Floats) ->
     return np.asarray(count[:, None] * dK**_EXPONENT)
 
 
-def _cracks(solved: dict[float, LevelResponse]) -> range:
-    return range(len(next(iter(solved.values())).sif))
+def _cracks(solved_levels: dict[float, LevelResponse]) -> range:
+    return range(len(next(iter(solved_levels.values())).sif))
 
 
 # K over the factor of a load: solved at some levels, interpolated between them.
@@ -231,16 +250,16 @@ def respond_to_levels(
     """
     low, high = spectrum.extremes
     every = np.unique([spectrum.cycles["min"], spectrum.cycles["max"]])
-    exact = is_homogeneous(problem, spectrum) or problem.contact == "off"
+    is_exact = is_homogeneous(problem, spectrum) or problem.contact == "off"
     if spectrum.levels != "auto":
         factors = np.linspace(low, high, int(spectrum.levels))
-    elif exact:
+    elif is_exact:
         factors = np.array([low, high])
     elif len(every) <= _FIRST:
-        factors, exact = every, True  # all that is asked for is solved
+        factors, is_exact = every, True  # all that is asked for is solved
     else:
         factors = np.linspace(low, high, _FIRST)
-    if exact or spectrum.levels != "auto":
+    if is_exact or spectrum.levels != "auto":
         return solve(states_of(spectrum, factors), reuse)
     return refined_response(problem, spectrum, factors, solve, reuse)
 
@@ -248,8 +267,8 @@ def respond_to_levels(
 def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[LevelTable]:
     """Ladder of each crack, from K at the levels that were solved."""
     factors, sif = response.factors, response.sif
-    linear = len(factors) == 2
-    origin = linear and is_homogeneous(problem, spectrum) and factors[0] < 0 < factors[1]
+    is_linear = len(factors) == 2
+    origin = is_linear and is_homogeneous(problem, spectrum) and factors[0] < 0 < factors[1]
     result = []
     for c in range(len(sif[0])):
         K = np.stack([state[c].K for state in sif])
@@ -257,7 +276,7 @@ def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[Le
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
             result.append(LevelTable(np.array([factors[0], 0.0, factors[1]]), K, is_smooth=False))
         else:
-            result.append(LevelTable(factors, K, is_smooth=not linear))
+            result.append(LevelTable(factors, K, is_smooth=not is_linear))
     return result
 
 
@@ -294,10 +313,10 @@ def respond_to_states(
         if rule.response is None:
             response = respond(problem, states, reuse, bars, solver=rule.solver)
         else:
-            given = call_function(
+            result = call_function(
                 rule.response, "the response of a step", problem, tuple(states), reuse, bars
             )
-            response = checked_response(given, problem, states)
+            response = checked_response(result, problem, states)
         if load_factor != 1:
             response = replace(response, states=tuple(names), load_factor=load_factor)
         if spectrum is not None and response.solutions:

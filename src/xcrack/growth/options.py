@@ -125,8 +125,8 @@ class GrowthRule:
         if isinstance(self.retardation, Mapping):
             object.__setattr__(self, "retardation", RetardationSets(self.retardation))
         for name, argument in arguments_of(GrowthRule).items():
-            checked = argument.check(getattr(self, name), f"grow: {name}")
-            object.__setattr__(self, name, checked)
+            value = argument.check(getattr(self, name), f"grow: {name}")
+            object.__setattr__(self, name, value)
         if isinstance(self.law, LawSets):
             self.law.check([name for name, _ in self.problem.elasticity.named])
         if isinstance(self.retardation, RetardationSets):
@@ -222,10 +222,10 @@ class GrowthRule:
         return program is not None and program.needs_N and not self._loads_out_of_proportion()
 
     def _check_temperatures(self) -> None:
-        steady = [load for load in self.problem.loads if load.adds_up]
+        steady_loads = [load for load in self.problem.loads if load.adds_up]
         for k, state in enumerate(self.cycle.load_states):
             loads = [] if isinstance(state, Real) else [load for load in state if load.adds_up]
-            if steady and any(load not in steady for load in loads):
+            if steady_loads and any(load not in steady_loads for load in loads):
                 warn(
                     f"state {k} of the cycle has a {loads[0].kind} of its own, and the problem has "
                     "one that acts in all states: the two add up. If the states are to replace it, "

@@ -37,27 +37,27 @@ class Progress:
 
     def step(self, step: Step) -> None:
         """Tell of a step as soon as it is finished."""
-        now = time.perf_counter()
+        time_now = time.perf_counter()
         since = 0.0 if self._cycles is None else step.cycles - self._cycles
         line = _line(self.run, step)
-        left = _time_left(self.run, step, since, now - self._begin)
-        self._begin, self._cycles = now, step.cycles
-        _LOG.info("%s%s", line, left)
+        time_left = _time_left(self.run, step, since, time_now - self._begin)
+        self._begin, self._cycles = time_now, step.cycles
+        _LOG.info("%s%s", line, time_left)
         if not _is_wanted(self.run):
             return
         if self._bar is None and self.run.progress != "always":
             self._bar = _new_bar(self.run, step)
         if self._bar is None:
-            print(line + left, file=sys.stderr)
+            print(line + time_left, file=sys.stderr)
         else:
             self._bar.set_postfix_str(f"N {step.cycles:.6g}, dK_eq {_largest_part(step.dK_eq):.5g}")
             self._bar.update()
 
-    def end(self, ended: str) -> None:
+    def end(self, end: str) -> None:
         """Tell why growth ended."""
-        _LOG.info("growth ended: %s", ended)
+        _LOG.info("growth ended: %s", end)
         if _is_wanted(self.run):
-            print(f"growth ended: {ended}", file=sys.stderr)
+            print(f"growth ended: {end}", file=sys.stderr)
 
     def close(self) -> None:
         """Leave the bar as it is: after the last step, or where something stopped the run."""
@@ -92,13 +92,13 @@ def _time_left(run: GrowthRule, step: Step, cycles: float, seconds: float) -> st
     steps = [] if run.max_steps is None else [run.max_steps - 1.0 - step.index]
     if run.max_cycles is not None and cycles > 0:
         steps.append((run.max_cycles - step.cycles) / cycles)
-    left = min(steps, default=0.0) * seconds
-    if left <= 0:
+    seconds_left = min(steps, default=0.0) * seconds
+    if seconds_left <= 0:
         return ""
     unit, name = next(
-        (u, n) for u, n in ((3600, "h"), (60, "min"), (1, "s")) if left >= u or u == 1
+        (u, n) for u, n in ((3600, "h"), (60, "min"), (1, "s")) if seconds_left >= u or u == 1
     )
-    return f"  about {left / unit:.2g} {name} left"
+    return f"  about {seconds_left / unit:.2g} {name} left"
 
 
 def _is_wanted(run: GrowthRule) -> bool:
@@ -152,15 +152,15 @@ class WarningLog:
 
     def summarise(self) -> None:
         """Issue one warning for all kinds that came in more than one step, and are not ignored."""
-        several = (kind for kind in self.kinds.values() if kind.steps > 1)
-        again = [kind for kind in several if not _is_ignored(kind.message)]
+        kinds_of_steps = (kind for kind in self.kinds.values() if kind.steps > 1)
+        repeated_kinds = [kind for kind in kinds_of_steps if not _is_ignored(kind.message)]
         self.kinds = {}
-        if not again:
+        if not repeated_kinds:
             return
         lines = [
             f"in {kind.steps} of {self.n_steps} steps, from step {kind.first_step} to "
             f"{kind.last_step}, where it was: {kind.message}"
-            for kind in again
+            for kind in repeated_kinds
         ]
         warn(
             "during growth warnings came again; the columns spread and domain_cells of "
@@ -171,8 +171,8 @@ class WarningLog:
 def _is_ignored(message: str) -> bool:
     """Whether the user's filters ignore a warning of this text: the summary begins with another."""
     for action, text, category, module, _ in warnings.filters:
-        fits = text is None or re.match(text, message) is not None
-        if fits and module is None and issubclass(XcrackWarning, category):
+        is_match = text is None or re.match(text, message) is not None
+        if is_match and module is None and issubclass(XcrackWarning, category):
             return action == "ignore"
     return False
 

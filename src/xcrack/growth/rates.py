@@ -160,7 +160,7 @@ class Rates:
 
 
 def rates_of(
-    rule: GrowthRule, problem: Problem, response: Response, free: Response | None = None
+    rule: GrowthRule, problem: Problem, response: Response, free_response: Response | None = None
 ) -> Rates:
     """Ask criterion and law of a run what K of all load states means.
 
@@ -171,13 +171,13 @@ def rates_of(
         With the cracks that K belongs to.
     response : Response
         Of all load states; of a spectrum its factors are the levels.
-    free : Response, optional
+    free_response : Response, optional
         As of `response_without_contact`, where it is known already.
     """
     _check_choice(rule, response.sif)
-    if free is None:
-        free = response_without_contact(rule, problem, response)
-    inputs = criterion_inputs(rule, problem, response, free)
+    if free_response is None:
+        free_response = response_without_contact(rule, problem, response)
+    inputs = criterion_inputs(rule, problem, response, free_response)
     parts = [each.rates_of_K(each.K) for each in inputs]
     angle, dK_eq, R, law_rate, R_range = (
         np.concatenate([getattr(part, name) for part in parts])
@@ -185,12 +185,14 @@ def rates_of(
     )
     stations = solved_stations(response.sif[0])
     if response.solutions and any(problem.frictions):
-        still = _is_locked(problem, response, dK_eq)
-        dK_eq, law_rate = np.where(still, 0.0, dK_eq), np.where(still, 0.0, law_rate)
-    still = _at_rest(problem, response, dK_eq)
-    dK_eq, law_rate = np.where(still, 0.0, dK_eq), np.where(still, 0.0, law_rate)
+        is_at_rest = _is_locked(problem, response, dK_eq)
+        dK_eq, law_rate = np.where(is_at_rest, 0.0, dK_eq), np.where(is_at_rest, 0.0, law_rate)
+    is_at_rest = _at_rest(problem, response, dK_eq)
+    dK_eq, law_rate = np.where(is_at_rest, 0.0, dK_eq), np.where(is_at_rest, 0.0, law_rate)
     rate = np.where(dK_eq < rule.threshold, 0.0, law_rate)
-    return Rates(problem, response, stations, angle, dK_eq, R, law_rate, rate, R_range, free)
+    return Rates(
+        problem, response, stations, angle, dK_eq, R, law_rate, rate, R_range, free_response
+    )
 
 
 def rates_by_law_of(rule: GrowthRule, problem: Problem, response: Response, sets: Ints) -> Floats:
@@ -206,8 +208,8 @@ def rates_by_law_of(rule: GrowthRule, problem: Problem, response: Response, sets
     sets : (n,) array of int
         Numbers of the materials.
     """
-    named = np.array([name for name, _ in problem.elasticity.named])[sets]
-    names = np.split(named, np.cumsum([len(sif.x) for sif in response.sif[0]])[:-1])
+    names_of_sets = np.array([name for name, _ in problem.elasticity.named])[sets]
+    names = np.split(names_of_sets, np.cumsum([len(sif.x) for sif in response.sif[0]])[:-1])
     inputs = criterion_inputs(rule, problem, response, names=names)
     return np.concatenate([one.rates_of_K(one.K).rate for one in inputs])
 
@@ -229,7 +231,7 @@ def criterion_inputs(
     rule: GrowthRule,
     problem: Problem,
     response: Response,
-    free: Response | None = None,
+    free_response: Response | None = None,
     names: Sequence[Names] | None = None,
 ) -> list[CriterionInput]:
     """What criterion and law are asked about each crack.
@@ -240,7 +242,7 @@ def criterion_inputs(
     problem : Problem
     response : Response
         Of all states.
-    free : Response, optional
+    free_response : Response, optional
         Without contact, for a law with nominal R.
     names : sequence of (f,) arrays of str, optional
         Materials whose laws count, one array a crack: those that the stations are in.
@@ -248,37 +250,39 @@ def criterion_inputs(
     if names is None:
         names = [problem.elasticity.names_at(sif.x) for sif in response.sif[0]]
     of_rule = _inputs_of_blocks if isinstance(rule.cycle, Spectrum) else _inputs_of_cycle
-    return of_rule(rule, problem, response, free, names)
+    return of_rule(rule, problem, response, free_response, names)
 
 
 def _inputs_of_cycle(
     rule: GrowthRule,
     problem: Problem,
     response: Response,
-    free: Response | None,
+    free_response: Response | None,
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
     place = PLACE[problem.mesh.dim]
 
     def of_crack(c: int) -> CriterionInput:
         nu = problem.elasticity.poisson_at(response.sif[0][c].x)
-        given = np.stack([state[c].K for state in response.sif])
-        a = law_size(problem.mesh.dim, problem.sizes[c], given.shape[1])
+        K_of_states = np.stack([state[c].K for state in response.sif])
+        a = law_size(problem.mesh.dim, problem.sizes[c], K_of_states.shape[1])
         names = materials[c]
 
         def rates_of_K(K: Floats) -> CycleRates:
             times = K.shape[1] // max(len(a), 1)  # several K side by side at all stations
             own_nu = np.tile(nu, times) if isinstance(nu, np.ndarray) else nu
             angle, dK, R = evaluate_criterion(rule.criterion, K, own_nu, c, place)
-            if free is not None:
-                dK, R = nominal_range(np.stack([state[c].K for state in free.sif]), angle, nu)
+            if free_response is not None:
+                dK, R = nominal_range(
+                    np.stack([state[c].K for state in free_response.sif]), angle, nu
+                )
             rate = evaluate_law(rule.law, dK, R, c, place, np.tile(a, times), np.tile(names, times))
             return CycleRates(angle, dK, R, rate, np.stack([R, R], axis=1))
 
         def angle_of_K(K: Floats) -> Floats:
             return evaluate_criterion(rule.criterion, K, nu, c, place)[0]
 
-        return CriterionInput(given, rates_of_K, angle_of_K)
+        return CriterionInput(K_of_states, rates_of_K, angle_of_K)
 
     return [of_crack(c) for c in range(len(problem.placed))]
 
@@ -287,12 +291,14 @@ def _inputs_of_blocks(
     rule: GrowthRule,
     problem: Problem,
     response: Response,
-    free: Response | None,
+    free_response: Response | None,
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
     place = PLACE[problem.mesh.dim]
     every = pairs_of(rule, problem, response)
-    nominal = [None] * len(every) if free is None else pairs_of(rule, problem, free)
+    nominal_pairs = (
+        [None] * len(every) if free_response is None else pairs_of(rule, problem, free_response)
+    )
 
     def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
         shape, nu = pairs.K.shape, problem.elasticity.poisson_at(response.sif[0][c].x)
@@ -308,10 +314,10 @@ def _inputs_of_blocks(
         def angle_of_K(K: Floats) -> Floats:  # the mean of the cycles' directions needs their rates
             return rates_of_K(K).angle
 
-        flat = (shape[0] * shape[1], *shape[2:])  # -1 means nothing where no tip is left
-        return CriterionInput(pairs.K.reshape(flat), rates_of_K, angle_of_K)
+        flat_shape = (shape[0] * shape[1], *shape[2:])  # -1 means nothing where no tip is left
+        return CriterionInput(pairs.K.reshape(flat_shape), rates_of_K, angle_of_K)
 
-    return [of_crack(c, *each) for c, each in enumerate(zip(every, nominal, strict=True))]
+    return [of_crack(c, *each) for c, each in enumerate(zip(every, nominal_pairs, strict=True))]
 
 
 def law_size(dim: int, size: float, n: int) -> Floats:
@@ -336,13 +342,13 @@ def _at_rest(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     a crack that grew on that would need 1e20 cycles, and turn to and fro.
     """
     opening = [np.concatenate([each.K_I > 0 for each in state]) for state in response.sif]
-    closed = ~np.any(opening, axis=0)
-    if not response.solutions or not closed.any():
+    is_closed = ~np.any(opening, axis=0)
+    if not response.solutions or not is_closed.any():
         return np.zeros(len(dK_eq), dtype=bool)
     stress = mean_stress(response.solutions)
     dim, sizes = problem.mesh.dim, zip(problem.sizes, response.sif[0], strict=True)
     size = np.concatenate([law_size(dim, a, len(sif.x)) for a, sif in sizes])
-    return np.asarray(closed & (dK_eq <= _FAINT * stress * np.sqrt(np.pi * size)))
+    return np.asarray(is_closed & (dK_eq <= _FAINT * stress * np.sqrt(np.pi * size)))
 
 
 # Ends that friction locks.
@@ -356,17 +362,17 @@ def _is_locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     """
     solutions, sif = response.solutions, response.sif
     parts = [np.zeros(len(each.x), dtype=bool) for each in sif[0]]
-    rubs = [c for c in range(len(parts)) if has_slip(solutions[0], c)]
-    if rubs:
+    rubbing_cracks = [c for c in range(len(parts)) if has_slip(solutions[0], c)]
+    if rubbing_cracks:
         nu = problem.elasticity.poisson_at(np.concatenate([each.x for each in sif[0]]))
         K = clipped_K(np.stack([np.concatenate([each.K for each in state]) for state in sif]))
         largest = float(local_equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
         split_ranges = split(dK_eq, [len(part) for part in parts])
-    for c in rubs:
+    for c in rubbing_cracks:
         lips = solutions[0].lips[c]
         nearest = [int(np.argmin(np.linalg.norm(lips.x - x, axis=1))) for x in sif[0][c].x]
-        stuck = [s.contact[c].stuck[nearest] for s in solutions]  # type: ignore[union-attr,index]
-        parts[c] = np.all(stuck, axis=0) | (split_ranges[c] <= _ROUND_OFF * largest)
+        is_stuck_in_states = [s.contact[c].stuck[nearest] for s in solutions]  # type: ignore[union-attr,index]
+        parts[c] = np.all(is_stuck_in_states, axis=0) | (split_ranges[c] <= _ROUND_OFF * largest)
     return np.concatenate(parts)
 
 
@@ -387,8 +393,8 @@ def _must_choose(law: Law | LawSets) -> bool:
 def _check_choice(rule: GrowthRule, sif: Answers) -> None:
     """The same, where no factors say R: a tip that is closed in some state has R < 0."""
     if rule.cycle.ratio is None and _must_choose(rule.law):
-        closed = any(crack.closed.any() for state in sif for crack in state)
-        if closed:
+        has_closed_front = any(crack.closed.any() for state in sif for crack in state)
+        if has_closed_front:
             raise ProblemError(_choice("a load state closes a tip, so that R < 0", rule.law))
 
 
@@ -471,7 +477,7 @@ def rates_by_kind(
     c: int,
     place: str,
     a: Floats,
-    nominal: RangePairs | None = None,
+    nominal_pairs: RangePairs | None = None,
     names: Names | None = None,
 ) -> PairRates:
     """Ask criterion and law about every kind of cycle; they see them as stations of one front.
@@ -487,7 +493,7 @@ def rates_by_kind(
         What a station is called in messages.
     a : (f,) array, length
         Crack size at each station.
-    nominal : RangePairs, optional
+    nominal_pairs : RangePairs, optional
         The same without contact, for a law with nominal R.
     names : (f,) array of str, optional
         Of the materials at the stations.
@@ -502,9 +508,9 @@ def rates_by_kind(
         angle, dK, R = evaluate_criterion(
             rule.criterion, K.reshape(2, n * f, modes), of_row, c, f"{place} of a cycle"
         )
-        if nominal is not None:
-            free = nominal.K[:, begin : begin + rows].reshape(2, n * f, modes)
-            dK, R = nominal_range(free, angle, of_row)
+        if nominal_pairs is not None:
+            K_without_contact = nominal_pairs.K[:, begin : begin + rows].reshape(2, n * f, modes)
+            dK, R = nominal_range(K_without_contact, angle, of_row)
         of_rows = None if names is None else np.tile(names, n)
         rate = evaluate_law(rule.law, dK, R, c, f"{place} of a cycle", np.tile(a, n), of_rows)
         rate = np.where(dK < rule.threshold, 0.0, rate)
@@ -528,11 +534,11 @@ def block_of(every: PairRates, count: Floats) -> CycleRates:
     """
     counts = count > 0
     growth = np.where(counts, count * every.rate, 0.0)
-    there = np.where(counts, every.dK, -1.0)
-    largest, place = there.argmax(axis=0), np.arange(count.shape[1])
+    dK_of_rows = np.where(counts, every.dK, -1.0)
+    largest, place = dK_of_rows.argmax(axis=0), np.arange(count.shape[1])
     dK, R, angle = (x[largest, place] for x in (every.dK, every.R, every.angle))
-    counted = np.where(counts, every.R, R)
-    R_range = np.stack([counted.min(axis=0), counted.max(axis=0)], axis=1)
+    R_of_rows = np.where(counts, every.R, R)
+    R_range = np.stack([R_of_rows.min(axis=0), R_of_rows.max(axis=0)], axis=1)
     rate = growth.sum(axis=0)
     mean = np.isfinite(rate) & (rate > 0) & ((growth > 0).sum(axis=0) > 1)
     with np.errstate(invalid="ignore"):
@@ -545,12 +551,12 @@ def block_of(every: PairRates, count: Floats) -> CycleRates:
 
 def warn_of_left_out(rule: GrowthRule, response: Response) -> None:
     """Say how much growth a spectrum leaves out with its small cycles, if it is worth a word."""
-    omitted = left_out_share(rule, rule.problem, response)
-    if omitted > _LEFT_OUT:
+    share_left_out = left_out_share(rule, rule.problem, response)
+    if share_left_out > _LEFT_OUT:
         warn(
-            f"the cycles that the spectrum leaves out are {omitted:.2%} of the growth of a block "
-            "at the place where they matter most, before the first step: lives are too long by as "
-            "much. Omit less to keep them."
+            f"the cycles that the spectrum leaves out are {share_left_out:.2%} of the growth of a "
+            "block at the place where they matter most, before the first step: lives are too long "
+            "by as much. Omit less to keep them."
         )
 
 
@@ -562,10 +568,10 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
     spectrum = rule.cycle
     if not isinstance(spectrum, Spectrum) or spectrum.states is not None:
         return 0.0
-    omitted = spectrum.left_out
-    if not len(omitted) or spectrum.least_range == 0:
+    ranges_left_out = spectrum.left_out
+    if not len(ranges_left_out) or spectrum.least_range == 0:
         return 0.0
-    values, count, _ = distinct_cycles(omitted)
+    values, count, _ = distinct_cycles(ranges_left_out)
     worst = 0.0
     every = pairs_of(rule, problem, response)
     for c, ladder in enumerate(ladders(problem, spectrum, response)):
@@ -576,14 +582,14 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
         nu = problem.elasticity.poisson_at(response.sif[0][c].x)
         names = problem.elasticity.names_at(response.sif[0][c].x)
         a = np.ones(f)
-        small = RangePairs(K, np.repeat(count[:, None], f, axis=1))
+        small_pairs = RangePairs(K, np.repeat(count[:, None], f, axis=1))
         growth = [
             block_of(rates_by_kind(rule, pairs, nu, c, "tip", a, names=names), pairs.count).rate
-            for pairs in (small, every[c])
+            for pairs in (small_pairs, every[c])
         ]
-        grows = np.nonzero(growth[0])[0]
+        rows_that_grow = np.nonzero(growth[0])[0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = growth[0][grows] / growth[1][grows]
+            ratio = growth[0][rows_that_grow] / growth[1][rows_that_grow]
         worst = max(worst, float(ratio.max(initial=0.0)))
     return worst
 
@@ -612,8 +618,8 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
         nu, names = problem.elasticity.poisson_at(x), problem.elasticity.names_at(x)
         every = rates_by_kind(rule, pairs, nu, c, place, a, names=names)
         parts.append((every.dK.T[None], every.R.T[None], a[None]))
-    several = isinstance(rule.law, LawSets) or isinstance(rule.retardation, RetardationSets)
-    sets = problem.elasticity.sets_at(rates.stations.x) if several else None
+    has_sets = isinstance(rule.law, LawSets) or isinstance(rule.retardation, RetardationSets)
+    sets = problem.elasticity.sets_at(rates.stations.x) if has_sets else None
     dK, R, size = (
         np.ascontiguousarray(np.concatenate(x, axis=1)) for x in zip(*parts, strict=True)
     )

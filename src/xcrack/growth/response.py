@@ -203,13 +203,13 @@ def respond(
             f"respond: solver = {value_text(solver)} cannot be called: give a function."
         )
     plane = problem.mesh.dim < 3  # of fronts, the bars need no factor
-    solved = solve_states(
+    new_solutions = solve_states(
         problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
     )
-    handed_on = solved[0].reuse
-    by_crack = [stress_intensities(solved, c, bars) for c in range(len(problem.cracks))]
+    handed_on = new_solutions[0].reuse
+    by_crack = [stress_intensities(new_solutions, c, bars) for c in range(len(problem.cracks))]
     light = handed_on.without_factor()
-    solutions = tuple(sound_copy(each, reuse=light, factored=None) for each in solved)
+    solutions = tuple(sound_copy(each, reuse=light, factored=None) for each in new_solutions)
     sif = tuple(zip(*by_crack, strict=True))
     return sound(Response, states=states, sif=sif, solutions=solutions, reuse=handed_on)
 

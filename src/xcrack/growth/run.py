@@ -18,7 +18,7 @@ from xcrack.fatigue.law import Law, LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_life, alarms_of_step, validity_of
-from xcrack.growth.cells import at_step, bars_are_foretold, begin, follow, replanned
+from xcrack.growth.cells import at_step, bars_are_foretold, begin, follow, plan_again
 from xcrack.growth.ends import (
     beyond_end,
     cannot_go_on,
@@ -225,22 +225,22 @@ def first_step(rule: GrowthRule) -> Step:
     return _solved_step(rule, rule.problem, None, SolverState(), {})[0]
 
 
-def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step, None, str]:
+def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator[Step, None, str]:
     """Steps of a run: from the beginning, or those that follow the steps that are done.
 
     Returns why the run ended.
     """
     check_choice(rule.law, rule.cycle.ratio)
     settings = rule.settings  # before a law is called that may change what it reads
-    done = steps_to_go_on_from(rule, done)
-    last, ended = done[-1] if done else None, ""
+    steps_done = steps_to_go_on_from(rule, steps_done)
+    last, end = steps_done[-1] if steps_done else None, ""
     if rule.estimates:
         rule = begin(rule)
-    begun = rule  # on the mesh of no step in particular
+    first_rule = rule  # on the mesh of no step in particular
     if rule.estimates and last is not None:
-        rule = at_step(begun, run_state(last))
+        rule = at_step(first_rule, run_state(last))
     notices, progress = WarningLog(), Progress(rule)
-    kink, is_torn = "", any(_alarm_of_segments(rule, step) for step in done)
+    kink, is_torn = "", any(_alarm_of_segments(rule, step) for step in steps_done)
     try:
         if last is None:
             with notices.watch(0) as messages:
@@ -248,7 +248,7 @@ def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step,
                 count = len(messages)
                 other = None
                 if not nothing_grows(rule, first):  # where nothing does, no mesh is fine enough
-                    other = replanned(begun, rule, None, first)
+                    other = plan_again(first_rule, rule, None, first)
                 if other is not None:
                     rule = other[0]
                     del messages[:count]  # of a mesh that is not used
@@ -263,61 +263,61 @@ def growth_steps(rule: GrowthRule, done: Sequence[Step] = ()) -> Generator[Step,
         else:
             reuse = run_state(last).reuse
         while True:
-            ended = end_of_run(rule, last) or refusal_of(rule, last)
-            if ended:
-                _refuse(last, ended)
+            end = end_of_run(rule, last) or refusal_of(rule, last)
+            if end:
+                _refuse(last, end)
                 break
             kink = kink or _warned_of_kink(rule, last)
             with notices.watch(last.index + 1) as messages:
                 cut = last if rule.max_size is None else _cut_at_size(rule, last)
-                ahead = rule if rule.cells is None else follow(begun, rule, cut)
-                reuse = reuse if ahead is rule else reuse.without_matrices()
-                next_step, reuse, ended = _step_after(ahead, cut, reuse)
+                next_rule = rule if rule.cells is None else follow(first_rule, rule, cut)
+                reuse = reuse if next_rule is rule else reuse.without_matrices()
+                next_step, reuse, end = _step_after(next_rule, cut, reuse)
                 if next_step is None:
                     break
-                is_torn = is_torn or _warn_of_mode_III(ahead, next_step)
+                is_torn = is_torn or _warn_of_mode_III(next_rule, next_step)
                 count = len(messages)
-                other = replanned(begun, ahead, cut, next_step)
+                other = plan_again(first_rule, next_rule, cut, next_step)
                 if other is not None:
                     del messages[:count]  # of a step that is not handed over
                 else:
                     if cut is not last:
                         next_step = _with_mark(next_step)
-                    next_step, reuse, ended = _cut_at_end(
-                        ahead, cut, (next_step, reuse, ended), messages
+                    next_step, reuse, end = _cut_at_end(
+                        next_rule, cut, (next_step, reuse, end), messages
                     )
-                    next_step = _with_validity(ahead, next_step)
+                    next_step = _with_validity(next_rule, next_step)
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
                 rule, last = other[0], _with_plan(other[0], other[1] or last)
                 continue
-            rule = ahead
+            rule = next_rule
             last = sound_copy(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
-            if ended:
+            if end:
                 break
     finally:
         notices.summarise()
-        if ended and last is not None:
-            alarm = alarm_of_life(rule, last, ended)
+        if end and last is not None:
+            alarm = alarm_of_life(rule, last, end)
             if alarm is not None:
                 warn(str(alarm))
-        short = "" if last is None or not rule.estimates else shortfall(rule, last)
-        if short:
-            warn(short)
+        message = "" if last is None or not rule.estimates else shortfall(rule, last)
+        if message:
+            warn(message)
         progress.close()
-    progress.end(ended)
-    return ended
+    progress.end(end)
+    return end
 
 
-def steps_to_go_on_from(rule: GrowthRule, done: Sequence[Step]) -> Sequence[Step]:
+def steps_to_go_on_from(rule: GrowthRule, steps_done: Sequence[Step]) -> Sequence[Step]:
     """Steps of a run without the last ones, if these were cut short for an end that is none now."""
-    if done and end_of_run(rule, done[-1]):
-        return done
-    while len(done) > 1 and done[-1].run is not None and done[-1].run.cut:
-        done = done[:-1]
-    return done
+    if steps_done and end_of_run(rule, steps_done[-1]):
+        return steps_done
+    while len(steps_done) > 1 and steps_done[-1].run is not None and steps_done[-1].run.cut:
+        steps_done = steps_done[:-1]
+    return steps_done
 
 
 def _with_mark(step: Step) -> Step:
@@ -352,36 +352,36 @@ def _cut_at_end(
     The false position by Dowell and Jarratt (1971, BIT 11, 168, "Illinois"), between the ends of
     the step, each time with a solve. No advance is below a tenth of a cell, which no mesh sees.
     """
-    plan, breaks = plan_of(last), bool(law_reaches_toughness(rule, ending[0]))
+    plan, is_break = plan_of(last), bool(law_reaches_toughness(rule, ending[0]))
     low, high = 0.0, plan.length * plan.part
-    at_high = beyond_end(rule, ending[0], breaks) - _AIM
+    at_high = beyond_end(rule, ending[0], is_break) - _AIM
     if at_high <= _AIM:
         return ending
-    at_low = max(beyond_end(rule, last, breaks), -1.0) - _AIM
-    least, reuse, bound = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip]), ending[1], ""
+    at_low = max(beyond_end(rule, last, is_break), -1.0) - _AIM
+    least_length, reuse, bound = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip]), ending[1], ""
     for _ in range(_TRIES):
         length = low + (high - low) * at_low / (at_low - at_high)
-        length = max(length, least)
-        if length >= high - 1e-3 * least:
+        length = max(length, least_length)
+        if length >= high - 1e-3 * least_length:
             break
-        shorter = _with_length(rule, last, length)
-        if plan_of(shorter).limit:
+        shorter_step = _with_length(rule, last, length)
+        if plan_of(shorter_step).limit:
             break
-        before = messages[:]
+        messages_before = messages[:]
         messages.clear()
-        step, reuse, ended = _step_after(rule, shorter, reuse)
-        beyond = -np.inf if step is None else beyond_end(rule, step, breaks) - _AIM
-        if step is None or beyond < -_AIM:
-            messages[:] = before
+        step, reuse, end = _step_after(rule, shorter_step, reuse)
+        excess = -np.inf if step is None else beyond_end(rule, step, is_break) - _AIM
+        if step is None or excess < -_AIM:
+            messages[:] = messages_before
             if step is None:
                 break
-            low, at_low = length, beyond
+            low, at_low = length, excess
             at_high *= 0.5 if bound == "high" else 1.0
             bound = "high"
             continue
-        ending = _with_mark(step), reuse, ended
-        high, at_high = length, beyond
-        if beyond <= _AIM:
+        ending = _with_mark(step), reuse, end
+        high, at_high = length, excess
+        if excess <= _AIM:
             break
         at_low *= 0.5 if bound == "low" else 1.0
         bound = "low"
@@ -400,7 +400,7 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
     from scipy.optimize import brentq
 
     plan = plan_of(last)
-    least = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip])
+    least_length = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip])
     longest = plan.length * plan.part
 
     def length_beyond(length: float) -> float:
@@ -413,11 +413,17 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
         )
         if at_end <= _SAME:
             slope = (at_end - at_begin) / longest
-            is_there = at_end >= -_SAME or longest < 2 * least or -at_end >= slope * least
-            return last if is_there else _with_length(rule, last, longest - least - at_end / slope)
-        if length_beyond(least) >= 0:
-            return _with_length(rule, last, least)
-        length = brentq(length_beyond, least, longest, xtol=_SAME * least, rtol=1e-15)
+            is_there = (
+                at_end >= -_SAME or longest < 2 * least_length or -at_end >= slope * least_length
+            )
+            return (
+                last
+                if is_there
+                else _with_length(rule, last, longest - least_length - at_end / slope)
+            )
+        if length_beyond(least_length) >= 0:
+            return _with_length(rule, last, least_length)
+        length = brentq(length_beyond, least_length, longest, xtol=_SAME * least_length, rtol=1e-15)
         return _with_length(rule, last, length)
     except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
         return last
@@ -425,20 +431,20 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
     """A step with a shorter way ahead, of which the advance of its stations is a share."""
-    shorter = _with_plan(rule, sound_copy(step, control=replace(step.control, length=length)))
-    plan, before = plan_of(shorter), plan_of(step)
-    share = plan.largest / before.largest if before.largest > 0 else 1.0
+    shorter_step = _with_plan(rule, sound_copy(step, control=replace(step.control, length=length)))
+    plan, plan_before = plan_of(shorter_step), plan_of(step)
+    share = plan.largest / plan_before.largest if plan_before.largest > 0 else 1.0
     if rule.integrator == "euler":  # it recognises its stations by that, to round-off
-        return sound_copy(shorter, da=split(plan.arc, [len(da) for da in step.da]))
-    return sound_copy(shorter, da=tuple(share * da for da in step.da))
+        return sound_copy(shorter_step, da=split(plan.arc, [len(da) for da in step.da]))
+    return sound_copy(shorter_step, da=tuple(share * da for da in step.da))
 
 
-def _refuse(step: Step, ended: str) -> None:
+def _refuse(step: Step, end: str) -> None:
     """Raise where the first step of a run is too short for the mesh; later that ends it."""
-    if step.plan is not None and step.plan.limit == "short" and ended.startswith("the advance"):
+    if step.plan is not None and step.plan.limit == "short" and end.startswith("the advance"):
         if step.index == 0:
-            raise ProblemError(ended)
-        warn(ended)
+            raise ProblemError(end)
+        warn(end)
 
 
 def _warned_of_kink(rule: GrowthRule, step: Step) -> str:
@@ -475,22 +481,24 @@ def _step_after(
     if plan.joins:
         slip = reuse.slip if len(plan.cracks) == len(last.cracks) else ()
         reuse = replace(reuse, centre=(), active=(), slip=slip)
-    joins = joins_of(last, problem)
+    joins_of_step = joins_of(last, problem)
     try:
-        ended = cut_off(last, problem, joins)
+        end = cut_off(last, problem, joins_of_step)
     except GeometryError as error:
         return None, reuse, cannot_go_on(last, error)
-    if joins and problem.mesh.dim == 2:
+    if joins_of_step and problem.mesh.dim == 2:
         reuse = SolverState()  # what belongs to numbers of cracks is void
-    near = coming_arrivals(last, problem)
-    if not any(placed.n_tips for placed in problem.placed):
-        step = _last_step(rule, last, problem, near, joins)
-        return step, reuse, ended
-    if ended:
-        return None, reuse, ended
+    arrivals_ahead = coming_arrivals(last, problem)
+    if not any(placed_crack.n_tips for placed_crack in problem.placed):
+        step = _last_step(rule, last, problem, arrivals_ahead, joins_of_step)
+        return step, reuse, end
+    if end:
+        return None, reuse, end
     try:
-        step, reuse = _solved_step(rule, problem, last, reuse, run_state(last).settings, joins)
-        arrivals = arrivals_of(rule, last, near, step.cycles - last.cycles)
+        step, reuse = _solved_step(
+            rule, problem, last, reuse, run_state(last).settings, joins_of_step
+        )
+        arrivals = arrivals_of(rule, last, arrivals_ahead, step.cycles - last.cycles)
         return sound_copy(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
         return None, reuse, cannot_go_on(last, error)
@@ -500,8 +508,8 @@ def _step_after(
             if not piece:
                 raise
             return None, reuse, f"{piece}, after step {last.index}, N = {last.cycles:.6g}"
-        left = left_the_body(rule, arrivals_of(rule, last, near, None))
-        return None, reuse, f"{left}, and the body cannot be solved without it: {error}"
+        words = left_the_body(rule, arrivals_of(rule, last, arrivals_ahead, None))
+        return None, reuse, f"{words}, and the body cannot be solved without it: {error}"
 
 
 def _scene(rule: GrowthRule, last: Step) -> Problem:
@@ -520,7 +528,7 @@ def _solved_step(
     last: Step | None,
     reuse: SolverState,
     settings: Mapping[str, str],
-    joins: Sequence[Join] = (),
+    joins_of_step: Sequence[Join] = (),
     may_foretell: bool = True,
 ) -> tuple[Step, SolverState]:
     """Solve all load states of a problem and decide where and how fast its cracks grow.
@@ -528,15 +536,17 @@ def _solved_step(
     Where it may foretell the bars of K, they are those of the last solve, a little wider.
     """
     is_foretold = False
-    if may_foretell and last is not None and not joins and bars_are_foretold(rule, last):
+    if may_foretell and last is not None and not joins_of_step and bars_are_foretold(rule, last):
         if rule.max_steps is not None and last.index + 2 >= rule.max_steps:
             # The last step has bars of its own; of a run that goes on it is one among others.
-            step, handed_on = _solved_step(rule, problem, last, reuse, settings, joins, False)
+            step, handed_on = _solved_step(
+                rule, problem, last, reuse, settings, joins_of_step, False
+            )
             return _with_mark(step), handed_on
         response = respond_to_states(rule, problem, reuse)
         with_bars = foretold_bars(last.sif, response.sif)
         if with_bars is None:
-            return _solved_step(rule, problem, last, response.reuse, settings, joins, False)
+            return _solved_step(rule, problem, last, response.reuse, settings, joins_of_step, False)
         response, is_foretold = replace(response, sif=with_bars), True
     elif rule.load_program is None:
         response = respond_to_states(rule, problem, reuse, rule.estimates)
@@ -549,29 +559,29 @@ def _solved_step(
     if last is None:
         index, radius = 0, rule.problem.numerics.radius
         identities = first_identities(problem.placed)
-        corrected = integrator.begin(rule, rates, identities)
-        modelled = bool(solutions) and len(solutions[0].space.radius) > 0
-        if radius is None and rule.tolerance is None and modelled:
+        result = integrator.begin(rule, rates, identities)
+        has_tip_functions = bool(solutions) and len(solutions[0].space.radius) > 0
+        if radius is None and rule.tolerance is None and has_tip_functions:
             radius = float(np.min(solutions[0].space.radius))
     else:
         index, radius = last.index + 1, run_state(last).radius
-        identities = _identities(rule, last, problem, joins)
+        identities = _identities(rule, last, problem, joins_of_step)
         correct = joins_3d.joined if plan_of(last).joins else integrator.correct
-        corrected = correct(rule, last, rates, identities)
+        result = correct(rule, last, rates, identities)
         for _ in range(_AGREES if rule.follows_cycles else 0):  # the cycles were foretold
-            change = load_factor_at(rule, problem, corrected.cycles) / response.load_factor
+            change = load_factor_at(rule, problem, result.cycles) / response.load_factor
             if abs(change - 1) < _SAME:
                 break
             response = response.scaled(sqrt(change))  # half of it: fewer cycles, smaller loads
             sif, solutions = response.sif, response.solutions
             rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
-            corrected = correct(rule, last, rates, identities)
-    corrected = add_K_error(rule, last, corrected, rates, sif, is_foretold)
+            result = correct(rule, last, rates, identities)
+    result = add_K_error(rule, last, result, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
     step = sound(
         Step,
         index=index,
-        cycles=corrected.cycles,
+        cycles=result.cycles,
         cracks=rates.cracks,
         sif=sif,
         angle=rates.split(rates.angle),
@@ -581,20 +591,20 @@ def _solved_step(
         da=rates.split(np.zeros(len(rates.rate))),
         solutions=solutions,
         levels=levels,
-        corrected=corrected.cracks,
-        error=corrected.error,
-        joins=tuple(replace(join, N=corrected.cycles) for join in joins),
+        corrected=result.cracks,
+        error=result.error,
+        joins=tuple(replace(join, N=result.cycles) for join in joins_of_step),
         states=states,
         law_rate=rates.split(rates.law_rate),
         R_range=rates.split(rates.R_range),
         sizes=problem.sizes,
         load_factor=response.load_factor,
         identities=identities,
-        stations=corrected.stations,
-        solves=corrected.solves,
-        zones=corrected.zones,
-        earlier_zones=corrected.earlier_zones,
-        control=corrected.control,
+        stations=result.stations,
+        solves=result.solves,
+        zones=result.zones,
+        earlier_zones=result.earlier_zones,
+        control=result.control,
         run=RunState(
             settings,
             handed_on.without_matrices(),
@@ -605,7 +615,9 @@ def _solved_step(
     )
     step = _with_plan(rule, step)
     if is_foretold and (step.plan is None or step.plan.limit or end_of_run(rule, step)):
-        step, handed_on = _solved_step(rule, problem, last, handed_on, settings, joins, False)
+        step, handed_on = _solved_step(
+            rule, problem, last, handed_on, settings, joins_of_step, False
+        )
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
     return sound_copy(step, da=rates.split(da)), handed_on
@@ -624,58 +636,60 @@ def _with_plan(rule: GrowthRule, step: Step) -> Step:
 
 
 def _identities(
-    rule: GrowthRule, last: Step, problem: Problem, joins: Sequence[Join]
+    rule: GrowthRule, last: Step, problem: Problem, joins_of_step: Sequence[Join]
 ) -> Identities:
     """Which tips, fronts and cracks those of the next scene are."""
-    before = last.identities or first_identities(last.cracks)
-    numbers = numbers_after(len(last.cracks), joins, len(problem.placed))
+    identities_before = last.identities or first_identities(last.cracks)
+    numbers = numbers_after(len(last.cracks), joins_of_step, len(problem.placed))
     place = integrator_of(rule).ends_of(last, plan_of(last))
-    return identities_after(before, numbers, solves_of(last)[0], place, problem.placed)
+    return identities_after(identities_before, numbers, solves_of(last)[0], place, problem.placed)
 
 
 def _last_step(
     rule: GrowthRule,
     last: Step,
     problem: Problem,
-    near: Sequence[Arriving],
-    joins: Sequence[Join],
+    arrivals_ahead: Sequence[Arriving],
+    joins_of_step: Sequence[Join],
 ) -> Step:
     """The step at which no tip is left: cracks that end on the boundary, without K.
 
     Its cycles are those of the last tip.
     """
     plan = plan_of(last)
-    arrivals = arrivals_of(rule, last, near, None)
+    arrivals = arrivals_of(rule, last, arrivals_ahead, None)
     cracks = tuple(
-        ended_crack(before, after, [one for one in near if one.crack == c])
-        for c, (before, after) in enumerate(zip(plan.cracks, problem.placed, strict=True))
+        ended_crack(planned_crack, placed_crack, [one for one in arrivals_ahead if one.crack == c])
+        for c, (planned_crack, placed_crack) in enumerate(
+            zip(plan.cracks, problem.placed, strict=True)
+        )
     )
-    none = tuple(np.zeros(0) for _ in cracks)
+    no_places = tuple(np.zeros(0) for _ in cracks)
     cycles = max((arrival.cycles for arrival in arrivals), default=last.cycles)
     error = last.error
     if error is not None:  # no K has been solved for the last ligament: its cycles count in full
-        unknown = error.unknown + cycles - last.cycles
-        error = replace(error, place=none, newest_place=(), unknown=unknown)
+        unknown_cycles = error.unknown + cycles - last.cycles
+        error = replace(error, place=no_places, newest_place=(), unknown=unknown_cycles)
     return Step(
         index=last.index + 1,
-        cycles=max([cycles, *(join.N for join in joins)]),
+        cycles=max([cycles, *(join.N for join in joins_of_step)]),
         cracks=cracks,
         # Two cracks may have become one.
         sif=tuple(tuple(map(_without_stations, state[: len(cracks)])) for state in last.sif),
-        angle=none,
-        dK_eq=none,
-        R=none,
-        rate=none,
-        da=none,
+        angle=no_places,
+        dK_eq=no_places,
+        R=no_places,
+        rate=no_places,
+        da=no_places,
         levels=last.levels,
         error=error,
         arrivals=arrivals,
-        joins=tuple(joins),
+        joins=tuple(joins_of_step),
         states=last.states,
-        law_rate=none,
+        law_rate=no_places,
         R_range=tuple(np.zeros((0, 2)) for _ in cracks),
         sizes=tuple(crack_size(cracks, c, problem.mesh) for c in range(len(cracks))),
-        identities=_identities(rule, last, problem, joins),
+        identities=_identities(rule, last, problem, joins_of_step),
         run=last.run,
     )
 

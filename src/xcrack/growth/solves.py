@@ -83,10 +83,10 @@ class SolveHistory:
         """The same without the newest solves."""
         return self._of_solves(slice(0, count))
 
-    def _of_solves(self, which: slice) -> "SolveHistory":
+    def _of_solves(self, rows: slice) -> "SolveHistory":
         names = ("sigma", "rate", "dK_eq", "direction")
-        kinds = None if self.kinds is None else self.kinds.rows(which)
-        return replace(self, **{name: getattr(self, name)[which] for name in names}, kinds=kinds)
+        kinds = None if self.kinds is None else self.kinds.rows(rows)
+        return replace(self, **{name: getattr(self, name)[rows] for name in names}, kinds=kinds)
 
     def with_solve(
         self,
@@ -100,7 +100,7 @@ class SolveHistory:
         """The same with one more solve at the stations."""
         if self.kinds is not None and kinds is not None:
             kinds = self.kinds.followed_by(kinds, KEPT)
-        more = replace(
+        with_new = replace(
             self,
             sigma=np.append(self.sigma, sigma),
             rate=np.vstack([self.rate, rate]),
@@ -109,7 +109,7 @@ class SolveHistory:
             exponent=exponent,
             kinds=None,
         )
-        return replace(more.last(KEPT), kinds=kinds)
+        return replace(with_new.last(KEPT), kinds=kinds)
 
     def with_direction(self, direction: Floats) -> "SolveHistory":
         """The same with other directions `(n, d)` at the newest solve."""
@@ -150,8 +150,8 @@ def rates_at(solves: SolveHistory, s: Floats, threshold: float = 0.0) -> Floats:
     if solves.rate_bend is None:
         rate = _positive_power(solves, solves.rate, s, solves.exponent)
     else:
-        smooth = solves.rate * np.exp(-solves.rate_bend * np.sqrt(solves.sigma[:, None]))
-        rate = _positive_power(solves, smooth, s, solves.exponent)
+        smooth_rate = solves.rate * np.exp(-solves.rate_bend * np.sqrt(solves.sigma[:, None]))
+        rate = _positive_power(solves, smooth_rate, s, solves.exponent)
         rate = rate * np.exp(solves.rate_bend * np.sqrt(s[:, None]))
     if threshold > 0:
         rate = np.where(_positive_power(solves, solves.dK_eq, s, 1.0) < threshold, 0.0, rate)
@@ -164,10 +164,14 @@ def _positive_power(solves: SolveHistory, values: Floats, s: Floats, exponent: f
     with np.errstate(over="ignore", under="ignore"):
         logarithm = _curve(nodes, np.log(np.maximum(values, _LEAST_SCALE)), x)
         power = np.exp(np.clip(logarithm, -690, 690))
-    tiny = (values <= _TINY * values.max(axis=1, keepdims=True)).any(axis=0)
-    if tiny.any():
-        root = _lines(nodes[:, tiny], values[:, tiny] ** (1 / exponent), x[:, tiny])
-        power[:, tiny] = np.maximum(root, 0.0) ** exponent
+    has_tiny_value = (values <= _TINY * values.max(axis=1, keepdims=True)).any(axis=0)
+    if has_tiny_value.any():
+        root = _lines(
+            nodes[:, has_tiny_value],
+            values[:, has_tiny_value] ** (1 / exponent),
+            x[:, has_tiny_value],
+        )
+        power[:, has_tiny_value] = np.maximum(root, 0.0) ** exponent
     return power
 
 
@@ -179,12 +183,17 @@ def _curve(nodes: Floats, values: Floats, x: Floats) -> Floats:
     result = line[0] * values[0] + line[1] * values[1]
     if len(nodes) < 3:
         return result
-    newest = nodes[2:]
-    there = _line_shares(nodes, newest)
-    first, last = np.exp(2 * (nodes[:2] - newest))
-    bends = np.exp(2 * (x - newest)) - (line[0] * first + line[1] * last)
-    whole = 1.0 - (there[0] * first + there[1] * last)
-    return result + (values[2:] - (there[0] * values[0] + there[1] * values[1])) * bends / whole
+    new_nodes = nodes[2:]
+    shares_there = _line_shares(nodes, new_nodes)
+    first, last = np.exp(2 * (nodes[:2] - new_nodes))
+    bends = np.exp(2 * (x - new_nodes)) - (line[0] * first + line[1] * last)
+    weight_of_bend = 1.0 - (shares_there[0] * first + shares_there[1] * last)
+    return (
+        result
+        + (values[2:] - (shares_there[0] * values[0] + shares_there[1] * values[1]))
+        * bends
+        / weight_of_bend
+    )
 
 
 def _line_shares(nodes: Floats, x: Floats) -> tuple[Floats, Floats]:
@@ -197,8 +206,8 @@ def _lines(nodes: Floats, values: Floats, x: Floats) -> Floats:
     """Lines from node to node, the last one prolonged: `(q, n)`."""
     result = lagrange(nodes[-2:], values[-2:], x)
     for k in range(len(nodes) - 2, 0, -1):
-        before = lagrange(nodes[k - 1 : k + 1], values[k - 1 : k + 1], x)
-        result = np.where(x < nodes[k], before, result)
+        value_before = lagrange(nodes[k - 1 : k + 1], values[k - 1 : k + 1], x)
+        result = np.where(x < nodes[k], value_before, result)
     return result
 
 
@@ -227,27 +236,27 @@ def _sum(shares: Sequence[Floats], values: Floats) -> Floats:
 
 
 def bisected_length(
-    holds: Callable[[float], bool], most: float, times: int = 40
+    is_true: Callable[[float], bool], largest: float, times: int = 40
 ) -> tuple[float, float]:
     """Lengths between which a condition ceases to hold, in [0, most].
 
     Parameters
     ----------
-    holds : callable length -> bool
-        True at 0, false at `most`.
-    most : float
+    is_true : callable length -> bool
+        True at 0, false at `largest`.
+    largest : float
     times : int
         The two lengths are most / 2^times apart.
 
     Returns
     -------
     low, high : float
-        It holds at `low`, or low is 0; not at `high`, or high is `most`.
+        It holds at `low`, or low is 0; not at `high`, or high is `largest`.
     """
-    low, high = 0.0, most
+    low, high = 0.0, largest
     for _ in range(times):
         middle = 0.5 * (low + high)
-        if holds(middle):
+        if is_true(middle):
             low = middle
         else:
             high = middle
@@ -312,12 +321,12 @@ class Stretch:
     start: float
     length: float
     threshold: float = 0.0
-    marched: CycleIntegration | None = None
+    integration: CycleIntegration | None = None
 
     @property
     def zones(self) -> OverloadZones | None:
         """What overloads have left at its end."""
-        return None if self.marched is None else self.marched.zones
+        return None if self.integration is None else self.integration.zones
 
     def arcs(self, length: float | None = None) -> tuple[Floats, float]:
         """Lengths of the paths `(n,)`, and cycles, over all of it or a first part."""
@@ -329,20 +338,20 @@ class Stretch:
         return self._up_to(self.length)
 
     def _up_to(self, length: float) -> "_Pieces":
-        if self.marched is not None:
-            inside = self.marched.sigma < length
-            arc, cycles = self.marched.until(length)
-            sigma = np.append(self.marched.sigma[inside], length)
-            share = np.diff(np.vstack([self.marched.arc[inside], arc]), axis=0)
+        if self.integration is not None:
+            inside = self.integration.sigma < length
+            arc, cycles = self.integration.until(length)
+            sigma = np.append(self.integration.sigma[inside], length)
+            share = np.diff(np.vstack([self.integration.arc[inside], arc]), axis=0)
             s = self.start + 0.5 * (sigma[1:] + sigma[:-1])
             return _Pieces(self.solves.sigma, s, np.ones(len(share)), share, arc, cycles)
         s, weight = self.start + length * _POINTS, length * _WEIGHTS
         rate = rates_at(self.solves, s, self.threshold)
         largest = rate.max(axis=1, initial=0.0)
-        grows = largest > 0
-        safe = np.where(grows, largest, 1.0)
-        share = np.where(grows[:, None], rate / safe[:, None], 0.0)
-        cycles = float(weight @ np.where(grows, 1 / safe, 0.0))
+        is_growing = largest > 0
+        safe_largest = np.where(is_growing, largest, 1.0)
+        share = np.where(is_growing[:, None], rate / safe_largest[:, None], 0.0)
+        cycles = float(weight @ np.where(is_growing, 1 / safe_largest, 0.0))
         return _Pieces(self.solves.sigma, s, weight, share, weight @ share, cycles)
 
     def growth(self, frame: Floats, angle: Floats, length: float | None = None) -> Growth:
@@ -366,8 +375,10 @@ class Stretch:
             theta = _sum(pieces.turns, smooth) + bend * np.sqrt(pieces.s[:, None])
         else:
             theta = _sum(pieces.turns, angle)
-        along, across = (pieces.weight @ (pieces.share * f(theta)) for f in (np.cos, np.sin))
-        move = along[:, None] * frame[:, 0] + across[:, None] * frame[:, 1]
+        growth_along, growth_across = (
+            pieces.weight @ (pieces.share * f(theta)) for f in (np.cos, np.sin)
+        )
+        move = growth_along[:, None] * frame[:, 0] + growth_across[:, None] * frame[:, 1]
         return Growth(move, pieces.arc, pieces.cycles)
 
     def length_of_cycles(self, cycles: float) -> float:
@@ -379,13 +390,13 @@ class Stretch:
     def growing_length(self) -> float:
         """Part up to which anything grows, length."""
 
-        def grows(part: float) -> bool:
+        def is_growing_at(part: float) -> bool:
             rate = rates_at(self.solves, np.array([self.start + part]), self.threshold)
             return bool((rate > 0).any())
 
-        if grows(self.length):
+        if is_growing_at(self.length):
             return self.length
-        return bisected_length(grows, self.length, _PASSES)[0]
+        return bisected_length(is_growing_at, self.length, _PASSES)[0]
 
 
 def stretch_of(
@@ -400,11 +411,11 @@ def stretch_of(
 
     With retardation it ends after some blocks of cycles, if it does not sooner.
     """
-    marched = None
+    integration = None
     if zones is not None:
         grid = np.linspace(0.0, length, POINTS)
         assert solves.kinds is not None
-        marched = march(
+        integration = march(
             rule.law,
             rule.retardation,
             block_order(rule),
@@ -418,7 +429,7 @@ def stretch_of(
             blocks=blocks,
             names=[name for name, _ in rule.problem.elasticity.named],
         )
-    return Stretch(solves, start, length, rule.threshold, marched)
+    return Stretch(solves, start, length, rule.threshold, integration)
 
 
 __all__ = [

@@ -147,7 +147,7 @@ def _names_of(crack: Crack) -> list[str]:
 
 
 def identities_after(
-    before: Identities,
+    identities_before: Identities,
     numbers: Sequence[int],
     stations: GrowthStations,
     place: Floats,
@@ -160,7 +160,7 @@ def identities_after(
 
     Parameters
     ----------
-    before : Identities
+    identities_before : Identities
     numbers : sequence of int
         Number that each crack of before has now.
     stations : GrowthStations
@@ -170,9 +170,9 @@ def identities_after(
     cracks : sequence of Crack
         Placed, after the advance.
     """
-    names = list(before.names)
-    pairs = list(zip(before.cracks, numbers, strict=True))
-    firsts = [min(name for name, now in pairs if now == c) for c in range(len(cracks))]
+    names = list(identities_before.names)
+    pairs = list(zip(identities_before.cracks, numbers, strict=True))
+    firsts = [min(name for name, number in pairs if number == c) for c in range(len(cracks))]
     crack_now = np.array(numbers, dtype=np.int64)[stations.crack]
     ends = []
     for c, crack in enumerate(cracks):
@@ -195,11 +195,11 @@ def _identities_at(end: Ints, place: Floats, points: Sequence[Floats]) -> list[i
         return result
     number = np.repeat(np.arange(len(points)), [len(x) for x in points])
     nearest = end[cKDTree(place).query(np.concatenate(points))[1]]
-    claims, count = np.unique(np.stack([number, nearest], axis=1), axis=0, return_counts=True)
+    pairs, count = np.unique(np.stack([number, nearest], axis=1), axis=0, return_counts=True)
     for k in np.argsort(-count, kind="stable").tolist():
-        front, claimed = claims[k].tolist()
-        if result[front] < 0 and claimed not in result:
-            result[front] = claimed
+        front, claimed_front = pairs[k].tolist()
+        if result[front] < 0 and claimed_front not in result:
+            result[front] = claimed_front
     return result
 
 
@@ -229,9 +229,11 @@ class CellSizes:
 
     def with_ends(self, x: Floats, size: Floats) -> "CellSizes":
         """With sizes `(k,)` at the ends `(k, d)` of the cracks of another step."""
-        stays = ~self.moves
-        fixed = CellSizes(self.x[stays], self.size[stays], self.moves[stays])
-        return fixed.with_places(CellSizes(x, size, np.ones(len(x), dtype=bool)))
+        is_staying = ~self.moves
+        cells_that_stay = CellSizes(
+            self.x[is_staying], self.size[is_staying], self.moves[is_staying]
+        )
+        return cells_that_stay.with_places(CellSizes(x, size, np.ones(len(x), dtype=bool)))
 
     def with_places(self, other: "CellSizes") -> "CellSizes":
         """With the places of another one too."""

@@ -125,7 +125,7 @@ class Join(Event):
         return f"cracks {first} and {second} join at {place}, N = {self.N:.6g}"
 
 
-def checked_joins(given: Sequence[Join], what: str) -> tuple[Join, ...]:
+def checked_joins(value: Sequence[Join], what: str) -> tuple[Join, ...]:
     """Joins as a tuple.
 
     Raises
@@ -133,20 +133,20 @@ def checked_joins(given: Sequence[Join], what: str) -> tuple[Join, ...]:
     ProblemError
         One of them is no `Join`.
     """
-    joins = entries(given, what)
-    for join in joins:
+    checked = entries(value, what)
+    for join in checked:
         if not isinstance(join, Join):
             raise ProblemError(f"{what}: {value_text(join)} is none: give a tuple of Join.")
-    return joins
+    return checked
 
 
-def numbers_after(n: int, joins: Sequence[Join], left: int) -> list[int]:
-    """Number that each of n cracks has after joins that leave `left` cracks.
+def numbers_after(n: int, joins_of_step: Sequence[Join], n_left: int) -> list[int]:
+    """Number that each of n cracks has after joins that leave `n_left` cracks.
 
     Joins in which both cracks stay, because one ends on the other, come first.
     """
     number = list(range(n))
-    for join in joins[len(joins) - (n - left) :]:
+    for join in joins_of_step[len(joins_of_step) - (n - n_left) :]:
         one, other = sorted(number[c] for c in join.cracks)
         number = [one if c == other else c - (c > other) for c in number]
     return number
@@ -219,9 +219,11 @@ class Plan:
     @classmethod
     def at_rest(cls, step: "Step", cell: Floats) -> "Plan":
         """Nothing advances; its stations are in cells of such sizes `(n,)`."""
-        (stations, solves), still = solves_of(step), np.zeros(len(cell))
+        (stations, solves), no_advance = solves_of(step), np.zeros(len(cell))
         move = 0 * stations.x
-        return cls(solves.start, 0.0, 0.0, still, move, still > 0, cell, 0, 0.0, step.corrected)
+        return cls(
+            solves.start, 0.0, 0.0, no_advance, move, no_advance > 0, cell, 0, 0.0, step.corrected
+        )
 
     def with_cracks(self, advance: Callable[[], Sequence[Crack]]) -> "Plan":
         """With the cracks that it leads to, or with its limit where it cannot be taken."""
@@ -347,8 +349,8 @@ class StepError:
     @property
     def path_but_newest(self) -> float:
         """Error of the places but for what the next solve tells better, length."""
-        newest = self.newest_place or tuple(np.zeros_like(part) for part in self.place)
-        parts = zip(self.place, newest, strict=True)
+        newest_places = self.newest_place or tuple(np.zeros_like(part) for part in self.place)
+        parts = zip(self.place, newest_places, strict=True)
         return max((float((a - b).max(initial=0.0)) for a, b in parts), default=0.0) + self.K_place
 
 
@@ -503,13 +505,17 @@ class Step:
         number(self.cycles, "Step: cycles", least=0)
         if not all(isinstance(crack, Crack) for crack in entries(self.cracks, "Step: cracks")):
             raise ProblemError(f"Step: cracks = {value_text(self.cracks)}: give a tuple of Crack.")
-        moved = entries(self.corrected, "Step: corrected") or entries(self.cracks, "Step: cracks")
-        if not all(isinstance(crack, Crack) for crack in moved) or len(moved) != len(self.cracks):
+        moved_cracks = entries(self.corrected, "Step: corrected") or entries(
+            self.cracks, "Step: cracks"
+        )
+        if not all(isinstance(crack, Crack) for crack in moved_cracks) or len(moved_cracks) != len(
+            self.cracks
+        ):
             raise ProblemError(
                 f"Step: corrected = {value_text(self.corrected)}: give a Crack for each of "
                 f"`cracks`."
             )
-        object.__setattr__(self, "corrected", moved)
+        object.__setattr__(self, "corrected", moved_cracks)
         for solution in entries(self.solutions, "Step: solutions"):
             if not isinstance(solution, Solution):
                 raise ProblemError(

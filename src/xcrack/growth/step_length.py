@@ -32,20 +32,20 @@ _LIGAMENT = 0.2  # of the tolerance: cycles of a last ligament that no K need be
 
 def cell_for(length: float, turn: float) -> float:
     """Size of cells that leave room for a step, behind a kink of some angle (rad)."""
-    return length / shortest(1.0, turn)
+    return length / shortest_length(1.0, turn)
 
 
-def shortest(cell: float, turn: float) -> float:
+def shortest_length(cell: float, turn: float) -> float:
     """Shortest step in cells of some size, behind a kink of some angle (rad)."""
     return (_STRAIGHT + _KINKED * float(np.sin(min(abs(turn), np.pi / 2))) ** 2) * cell
 
 
 def step_error(
-    off: float,
+    path_error: float,
     length: float,
     off_cycles: float,
     cycles: float,
-    before: float,
+    cycles_before: float,
     tolerance: float,
     way: float = 0.0,
 ) -> float:
@@ -53,31 +53,33 @@ def step_error(
 
     Parameters
     ----------
-    off : float, length
+    path_error : float, length
         Largest estimated error of a tip.
     length : float, length
         Of the step.
     off_cycles, cycles : float
         Estimated error of the cycles of the step, and these.
-    before : float
+    cycles_before : float
         Cycles before the step.
     tolerance : float
         Of the path, relative to the length grown, and of the life.
     way : float, length
         Grown before the step.
     """
-    path = off / (max(length, _PAST_WAY * way) * tolerance)
-    whole = max(cycles, PAST * before)
-    life = off_cycles / (whole * tolerance) if whole > 0 else 0.0
+    path = path_error / (max(length, _PAST_WAY * way) * tolerance)
+    whole_cycles = max(cycles, PAST * cycles_before)
+    life = off_cycles / (whole_cycles * tolerance) if whole_cycles > 0 else 0.0
     return float(max(path, life, _LEAST))
 
 
-def first_length(size: float, tolerance: float, least: float) -> float:
+def first_length(size: float, tolerance: float, least_length: float) -> float:
     """Length of the first step for a crack of some size, and no less than the least."""
-    return float(max(_BEGIN * size * np.sqrt(tolerance), least))
+    return float(max(_BEGIN * size * np.sqrt(tolerance), least_length))
 
 
-def next_length(length: float, error: float, before: float | None, least: float) -> float:
+def next_length(
+    length: float, error: float, error_before: float | None, least_length: float
+) -> float:
     """Length of the next step.
 
     Parameters
@@ -86,9 +88,9 @@ def next_length(length: float, error: float, before: float | None, least: float)
         Of the last step.
     error : float
         `step_error` of it.
-    before : float or None
+    error_before : float or None
         That of the step before; None after the first step, and to do a step again.
-    least : float, length
+    least_length : float, length
 
     Returns
     -------
@@ -98,11 +100,11 @@ def next_length(length: float, error: float, before: float | None, least: float)
     -----
     Proportional and integral control (Gustafsson 1991) for a rule of second order.
     """
-    if before is None:
+    if error_before is None:
         factor = np.clip(_SAFE * error**-_FIRST, *_FIRST_CHANGE)
     else:
-        factor = np.clip(_SAFE * error**-_NOW * before**_BEFORE, *_CHANGE)
-    return float(max(length * factor, least))
+        factor = np.clip(_SAFE * error**-_NOW * error_before**_BEFORE, *_CHANGE)
+    return float(max(length * factor, least_length))
 
 
 def longest(rule: GrowthRule, control: StepControl) -> float:
@@ -115,7 +117,7 @@ def share_left(rule: GrowthRule) -> float:
     return _LEFT if rule.tolerance is None else _LEFT_OF_FEW
 
 
-def first_control(rule: GrowthRule, size: float, least: float, room: float) -> StepControl:
+def first_control(rule: GrowthRule, size: float, least_length: float, room: float) -> StepControl:
     """Length of the first step, and of the first after K has jumped.
 
     Parameters
@@ -123,24 +125,26 @@ def first_control(rule: GrowthRule, size: float, least: float, room: float) -> S
     rule : GrowthRule
     size : float, length
         Of the smallest crack.
-    least, room : float, length
+    least_length, room : float, length
         Shortest step, and the way to the boundary ahead of the fastest tip.
     """
     if rule.tolerance is None:
         return StepControl()
-    length = first_length(size, STEPS * rule.tolerance, least)
-    return StepControl(_length_in_room(rule, length, room, least, _AHEAD_AT_FIRST), None, least)
+    length = first_length(size, STEPS * rule.tolerance, least_length)
+    return StepControl(
+        _length_in_room(rule, length, room, least_length, _AHEAD_AT_FIRST), None, least_length
+    )
 
 
 def next_control(
     rule: GrowthRule,
     last: StepControl,
     length: float,
-    off: float,
+    path_error: float,
     off_cycles: float,
     cycles: float,
-    before: float,
-    least: float,
+    cycles_before: float,
+    least_length: float,
     room: float,
     way: float = 0.0,
 ) -> StepControl:
@@ -151,18 +155,24 @@ def next_control(
     rule : GrowthRule
     last : StepControl
         Of the step that is done.
-    length, off, off_cycles, cycles, before, way
+    length, path_error, off_cycles, cycles, cycles_before, way
         As of `step_error`.
-    least, room
+    least_length, room
         As of `first_control`.
     """
     if rule.tolerance is None:
         return StepControl()
     error = step_error(
-        off * STEPS / PATH, length, off_cycles, cycles, before, STEPS * rule.tolerance, way
+        path_error * STEPS / PATH,
+        length,
+        off_cycles,
+        cycles,
+        cycles_before,
+        STEPS * rule.tolerance,
+        way,
     )
-    target = next_length(length, error, last.error, least)
-    return StepControl(_length_in_room(rule, target, room, least), error, least)
+    target = next_length(length, error, last.error, least_length)
+    return StepControl(_length_in_room(rule, target, room, least_length), error, least_length)
 
 
 def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:
@@ -173,11 +183,11 @@ def leaves(rule: GrowthRule, room: float, rate: float, cycles: float) -> bool:
 
 
 def _length_in_room(
-    rule: GrowthRule, length: float, room: float, least: float, most: float = _AHEAD
+    rule: GrowthRule, length: float, room: float, least_length: float, most_of_room: float = _AHEAD
 ) -> float:
     """A length that leaves some of the way to the boundary ahead, but the least at least."""
-    share = min(most, _AHEAD_OF_FEW * (STEPS * float(rule.tolerance or 1.0)) ** (1 / 3))
-    return float(max(min(length, share * room), least))
+    share = min(most_of_room, _AHEAD_OF_FEW * (STEPS * float(rule.tolerance or 1.0)) ** (1 / 3))
+    return float(max(min(length, share * room), least_length))
 
 
 __all__ = [
@@ -193,6 +203,6 @@ __all__ = [
     "next_control",
     "next_length",
     "share_left",
-    "shortest",
+    "shortest_length",
     "step_error",
 ]

@@ -72,7 +72,7 @@ from xcrack.growth.step_length import (
     longest,
     next_control,
     share_left,
-    shortest,
+    shortest_length,
 )
 from xcrack.mesh.locate import cell_sizes, contains, nearest_boundary
 from xcrack.mesh.mesh import Mesh
@@ -94,9 +94,9 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         return Plan.at_rest(step, cell)
     stretch, stops = _piece_ahead(rule, step)
     growth = _growth(stations, stretch)
-    near = interfaces_ahead(rule, stations.x, growth.move)
-    if near is not None and (growth.arc > near.stop).any():
-        stretch, growth = _up_to_interfaces(rule, step, near, stretch, growth)
+    interfaces = interfaces_ahead(rule, stations.x, growth.move)
+    if interfaces is not None and (growth.arc > interfaces.stop).any():
+        stretch, growth = _up_to_interfaces(rule, step, interfaces, stretch, growth)
     else:
         stretch, growth = _up_to_boundary(rule, step, stretch, growth)
     row = int(np.argmax(growth.arc))
@@ -117,11 +117,15 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     if plan.largest < LEAST * cell[row]:
         return replace(plan, limit="short")
     try:
-        after, moves = with_tips_at(step.corrected, stations.x + growth.move, stations.fresh, cell)
-        plan = replace(plan, cracks=tuple(after), moves=moves)
+        cracks_after, moves = with_tips_at(
+            step.corrected, stations.x + growth.move, stations.fresh, cell
+        )
+        plan = replace(plan, cracks=tuple(cracks_after), moves=moves)
         # Where plastic zones end the run, they do so before the tips meet.
-        met = meetings(after, rule.problem.mesh) if rule.link_up is None else []
-        return _step_to_meeting(rule, step, plan, stretch, met) if met else plan
+        meetings_ahead = meetings(cracks_after, rule.problem.mesh) if rule.link_up is None else []
+        return (
+            _step_to_meeting(rule, step, plan, stretch, meetings_ahead) if meetings_ahead else plan
+        )
     except GeometryError as error:
         return replace(plan, limit="geometry", refusal=str(error))
 
@@ -129,26 +133,30 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
 def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
     """The next piece of σ, and whether all growth is seen to stop at its end."""
     solves = solves_of(step)[1]
-    known = solves.last(2)
+    last_solves = solves.last(2)
     length = longest(rule, step.control)
     if rule.cycles is not None:
-        fastest = float(solves.rate[-1].max(initial=0.0))
+        fastest_rate = float(solves.rate[-1].max(initial=0.0))
         factor = 1.0 if solves.n_solves == 1 else _FASTER
-        length = min(length, rule.cycles * fastest * factor)
+        length = min(length, rule.cycles * fastest_rate * factor)
     blocks = np.inf if rule.cycles is None else rule.cycles
-    stretch = stretch_of(rule, known, solves.start, length, step.zones, blocks)
-    if stretch.marched is not None:
-        came = min(length, stretch.marched.reached)
-        over = rule.cycles is not None and stretch.arcs(came)[1] >= rule.cycles * (1 - 1e-9)
-        return replace(stretch, length=came), came < length and not over
+    stretch = stretch_of(rule, last_solves, solves.start, length, step.zones, blocks)
+    if stretch.integration is not None:
+        length_reached = min(length, stretch.integration.reached)
+        is_over_cycles = rule.cycles is not None and stretch.arcs(length_reached)[
+            1
+        ] >= rule.cycles * (1 - 1e-9)
+        return replace(
+            stretch, length=length_reached
+        ), length_reached < length and not is_over_cycles
     if rule.cycles is not None:
         stretch = replace(stretch, length=stretch.length_of_cycles(rule.cycles))
-    grows = stretch.growing_length()
-    return replace(stretch, length=grows), grows < stretch.length
+    growing_length = stretch.growing_length()
+    return replace(stretch, length=growing_length), growing_length < stretch.length
 
 
 def _up_to_interfaces(
-    rule: GrowthRule, step: Step, near: InterfacesAhead, stretch: Stretch, growth: Growth
+    rule: GrowthRule, step: Step, interfaces: InterfacesAhead, stretch: Stretch, growth: Growth
 ) -> tuple[Stretch, Growth]:
     """A step that ends before an interface of materials, or behind it: its piece of σ, and growth.
 
@@ -156,27 +164,27 @@ def _up_to_interfaces(
     """
     stations, solves = solves_of(step)
     history = solves.last(2)
-    goal = np.where(growth.arc > near.stop, near.goal, np.inf)
-    most, row = stretch.length, int(np.argmax(growth.arc))
-    crosses = np.isfinite(goal) & (goal > near.way)
-    after = history
-    if crosses.any():
-        rate = rates_behind(rule, step, near)
-        rate = np.where(crosses & (rate > 0), rate, history.rate[-1])
-        after = replace(history, rate=np.broadcast_to(rate, history.rate.shape))
-        if crosses[row]:  # da and cycles are shorter than the cells there
-            most = max(most, min(float(goal[row]), step.control.length))
-    done = passage(
+    goal = np.where(growth.arc > interfaces.stop, interfaces.goal, np.inf)
+    largest_length, row = stretch.length, int(np.argmax(growth.arc))
+    is_crossing = np.isfinite(goal) & (goal > interfaces.way)
+    solves_after = history
+    if is_crossing.any():
+        rate = rates_behind(rule, step, interfaces)
+        rate = np.where(is_crossing & (rate > 0), rate, history.rate[-1])
+        solves_after = replace(history, rate=np.broadcast_to(rate, history.rate.shape))
+        if is_crossing[row]:  # da and cycles are shorter than the cells there
+            largest_length = max(largest_length, min(float(goal[row]), step.control.length))
+    passage_done = passage(
         rule,
         stations.frame,
-        lambda passed: mixed_solves(history, after, near.after, passed),
-        near,
+        lambda is_passed: mixed_solves(history, solves_after, interfaces.after, is_passed),
+        interfaces,
         goal,
         solves.start,
-        most,
+        largest_length,
         step.zones,
     )
-    return replace(stretch, length=done.length), done.growth
+    return replace(stretch, length=passage_done.length), passage_done.growth
 
 
 def _up_to_boundary(
@@ -191,23 +199,23 @@ def _up_to_boundary(
     if len(stations) < 2:
         return stretch, growth
     place, leaves = stations.x + growth.move, np.zeros(len(stations), dtype=bool)
-    for row, within in enumerate(contains(mesh, place).tolist()):
+    for row, is_inside in enumerate(contains(mesh, place).tolist()):
         gap, size = nearest_boundary(mesh, place[row])
-        leaves[row] = growth.arc[row] > 0 and not (within and gap > MOUTH * size)
+        leaves[row] = growth.arc[row] > 0 and not (is_inside and gap > MOUTH * size)
     if not leaves.any() or leaves.all():
         return stretch, growth
-    longer = stretch.length + float(cell_sizes(mesh, stations.x).max())
-    if stretch.marched is not None and longer > stretch.marched.sigma[-1]:
+    longer_length = stretch.length + float(cell_sizes(mesh, stations.x).max())
+    if stretch.integration is not None and longer_length > stretch.integration.sigma[-1]:
         zones = step.zones
-        longest_stretch = stretch_of(rule, stretch.solves, stretch.start, longer, zones)
+        longest_stretch = stretch_of(rule, stretch.solves, stretch.start, longer_length, zones)
         stretch = replace(longest_stretch, length=stretch.length)
 
     def holds(length: float) -> bool:
         return _is_inside(mesh, (stations.x + _growth(stations, stretch, length).move)[leaves])
 
-    if holds(longer):  # it runs along a side
+    if holds(longer_length):  # it runs along a side
         return stretch, growth
-    length = bisected_length(holds, longer)[1]
+    length = bisected_length(holds, longer_length)[1]
     return replace(stretch, length=length), _growth(stations, stretch, length)
 
 
@@ -217,42 +225,46 @@ def _growth(stations: GrowthStations, stretch: Stretch, length: float | None = N
 
 
 def _step_to_meeting(
-    rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, met: list[Meeting]
+    rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, meetings_ahead: list[Meeting]
 ) -> Plan:
     """A step that ends when the first tip meets another crack, and the cracks joined there."""
     stations = solves_of(step)[0]
     faces = last_faces(plan.cracks)
-    along = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
+    directions = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
 
     def left(meeting: Meeting, length: float) -> float:
         place = stations.x + _growth(stations, stretch, length).move
         to = meeting.x if meeting.other < 0 else place[meeting.other]
-        return float((to - place[meeting.tip]) @ along[meeting.tip])
+        return float((to - place[meeting.tip]) @ directions[meeting.tip])
 
-    most = plan.length + max(AHEAD * meeting.size for meeting in met)
-    if stretch.marched is not None and most > stretch.marched.sigma[-1]:
-        zones, known = step.zones, stretch.solves
-        stretch = stretch_of(rule, known, plan.sigma, most, zones)
-    arrival = [_arrival(partial(left, meeting), most) for meeting in met]
+    largest_length = plan.length + max(AHEAD * meeting.size for meeting in meetings_ahead)
+    if stretch.integration is not None and largest_length > stretch.integration.sigma[-1]:
+        zones, solves = step.zones, stretch.solves
+        stretch = stretch_of(rule, solves, plan.sigma, largest_length, zones)
+    arrival = [_arrival(partial(left, meeting), largest_length) for meeting in meetings_ahead]
     first = min(arrival)
-    if first == np.inf and not any(meeting.soon for meeting in met):
+    if first == np.inf and not any(meeting.is_soon for meeting in meetings_ahead):
         return plan
     length = plan.length if first == np.inf else first
     growth = _growth(stations, stretch, length)
     place = stations.x + growth.move
-    apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
-    arrived = {meeting.tip for meeting, when in zip(met, arrival) if when <= length}
-    now = [
+    cracks_apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
+    tips_arrived = {
+        meeting.tip
+        for meeting, arrival_length in zip(meetings_ahead, arrival)
+        if arrival_length <= length
+    }
+    meetings_now = [
         meeting
-        for meeting in meetings(apart, rule.problem.mesh, 2 * AHEAD)
-        if meeting.soon or meeting.tip in arrived
+        for meeting in meetings(cracks_apart, rule.problem.mesh, 2 * AHEAD)
+        if meeting.is_soon or meeting.tip in tips_arrived
     ]
-    if not now:
+    if not meetings_now:
         return plan
-    growth, unsure = _as_gap_closes(step, growth, now)
+    growth, cycle_error = _as_gap_closes(step, growth, meetings_now)
     place = stations.x + growth.move
-    apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
-    whole = joined(apart, moves.tolist(), now)
+    cracks_apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
+    joined_cracks = joined(cracks_apart, moves.tolist(), meetings_now)
     return replace(
         plan,
         length=length,
@@ -260,40 +272,41 @@ def _step_to_meeting(
         arc=growth.arc,
         move=growth.move,
         moves=moves,
-        cracks=tuple(whole),
-        apart=tuple(apart),
-        error=unsure,
+        cracks=tuple(joined_cracks),
+        apart=tuple(cracks_apart),
+        error=cycle_error,
     )
 
 
-def _as_gap_closes(step: Step, growth: Growth, met: list[Meeting]) -> tuple[Growth, float]:
+def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> tuple[Growth, float]:
     """Growth until two facing tips have met, and what is unsure of its cycles.
 
     No polynomial through solves before follows K in the last of a gap: its time is that of two
     equal cracks that face each other. The other tips come as far as they can in that.
     """
-    facing = [meeting for meeting in met if meeting.other >= 0]
-    if not facing or step.zones is not None:
+    facing_pairs = [meeting for meeting in meetings_now if meeting.other >= 0]
+    if not facing_pairs or step.zones is not None:
         return growth, 0.0
     stations, solves = solves_of(step)
     rate, m, radius = solves.rate[-1], solves.exponent, _radii(step)
     best = growth.cycles, 0.0
-    for meeting in facing:
+    for meeting in facing_pairs:
         i, k = meeting.tip, meeting.other
         gap, speed = float(np.linalg.norm(stations.x[k] - stations.x[i])), float(rate[i] + rate[k])
         if speed <= 0:
             continue
-        plain = gap / speed
-        cycles = plain * part_of_time(2 * gap / float(radius[i] + radius[k]), m, 2)
+        cycles_at_first_rate = gap / speed
+        cycles = cycles_at_first_rate * part_of_time(2 * gap / float(radius[i] + radius[k]), m, 2)
         if cycles < best[0]:
-            best = cycles, UNKNOWN[2] * (plain - cycles)
-    cycles, unsure = best
+            best = cycles, UNKNOWN[2] * (cycles_at_first_rate - cycles)
+    cycles, cycle_error = best
     share = cycles / growth.cycles if growth.cycles > 0 else 1.0
-    meets = np.isin(
-        np.arange(len(rate)), [row for meeting in facing for row in (meeting.tip, meeting.other)]
+    is_meeting = np.isin(
+        np.arange(len(rate)),
+        [row for meeting in facing_pairs for row in (meeting.tip, meeting.other)],
     )
-    part = np.where(meets, 1.0, share)
-    return Growth(part[:, None] * growth.move, part * growth.arc, cycles), unsure
+    part = np.where(is_meeting, 1.0, share)
+    return Growth(part[:, None] * growth.move, part * growth.arc, cycles), cycle_error
 
 
 def _radii(step: Step) -> Floats:
@@ -302,11 +315,11 @@ def _radii(step: Step) -> Floats:
     return np.repeat(half, [crack.n_tips for crack in step.cracks])
 
 
-def _arrival(left: Callable[[float], float], most: float) -> float:
+def _arrival(gap_left: Callable[[float], float], largest_length: float) -> float:
     """Length of σ after which nothing is left of a way; inf where that takes too long."""
-    if left(most) > 0:
+    if gap_left(largest_length) > 0:
         return np.inf
-    return bisected_length(lambda length: left(length) > 0, most)[1]
+    return bisected_length(lambda length: gap_left(length) > 0, largest_length)[1]
 
 
 def ends_of(step: Step, plan: Plan) -> Floats:
@@ -345,38 +358,38 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
     angle, rate, dK_eq = np.array(rates.angle), np.array(rates.law_rate), np.array(rates.dK_eq)
     bend, rate_bend = np.zeros(len(rate)), np.zeros(len(rate))
     # Of a law with nominal R the rates of a kinked crack are not known, nor a block's direction.
-    nominal = getattr(rule.law, "ratio", None) == "nominal"
-    known = not (nominal and isinstance(rule.cycle, Spectrum))
+    is_nominal = getattr(rule.law, "ratio", None) == "nominal"
+    is_known = not (is_nominal and isinstance(rule.cycle, Spectrum))
     turns = (np.abs(angle) > START) & (rate > 0)
-    if known and turns.any():
+    if is_known and turns.any():
         inputs = criterion_inputs(rule, rates.problem, rates.response)
         for c, inputs_of_crack in enumerate(inputs):
             rows = np.nonzero(rates.stations.crack == c)[0]
             if not turns[rows].any():
                 continue
-            begins, ratio, kinked = _kink(inputs_of_crack, turns[rows], rates, rows)
-            behind, dK = rate[rows], dK_eq[rows]
-            if not nominal:
+            first_angle, ratio, is_kinked = _kink(inputs_of_crack, turns[rows], rates, rows)
+            rate_behind, dK = rate[rows], dK_eq[rows]
+            if not is_nominal:
                 with collected_warnings([]):  # they are of cracks that nobody has
                     answer = inputs_of_crack.rates_of_K(
-                        clipped_K(kinked_K(clipped_K(inputs_of_crack.K), begins))
+                        clipped_K(kinked_K(clipped_K(inputs_of_crack.K), first_angle))
                     )
-                behind, dK = answer.rate, answer.dK_eq
-            kinks = kinked & (behind > 0) & np.isfinite(behind)
-            angle[rows] = np.where(kinks, begins, angle[rows])
-            rate[rows] = np.where(kinks, behind, rate[rows])
+                rate_behind, dK = answer.rate, answer.dK_eq
+            kinks = is_kinked & (rate_behind > 0) & np.isfinite(rate_behind)
+            angle[rows] = np.where(kinks, first_angle, angle[rows])
+            rate[rows] = np.where(kinks, rate_behind, rate[rows])
             dK_eq[rows] = np.where(kinks, dK, dK_eq[rows])
-            shear = ratio * np.sin(begins) * np.cos(begins)
+            shear = ratio * np.sin(first_angle) * np.cos(first_angle)
             bend[rows] = np.where(kinks, _COTTERELL_RICE * shear, 0.0)
-            opening = ratio * np.sin(begins) ** 2
+            opening = ratio * np.sin(first_angle) ** 2
             rate_bend[rows] = np.where(kinks, 0.5 * _COTTERELL_RICE * opening, 0.0)
-    slower = np.sqrt(rate / rate.max()) if np.isfinite(rate).all() and rate.any() else 0.0
-    bend, rate_bend = slower * bend, slower * rates.exponent(rule.law) * rate_bend
+    slowness = np.sqrt(rate / rate.max()) if np.isfinite(rate).all() and rate.any() else 0.0
+    bend, rate_bend = slowness * bend, slowness * rates.exponent(rule.law) * rate_bend
     direction = replace(rates, angle=angle).direction
     kinds = kinds_of(rule, rates)
     if kinds is not None:  # behind a kink scaled as the range
-        grown = np.divide(dK_eq, rates.dK_eq, out=np.ones_like(dK_eq), where=rates.dK_eq > 0)
-        kinds = replace(kinds, dK=kinds.dK * grown[None, :, None])
+        growth_of_dK = np.divide(dK_eq, rates.dK_eq, out=np.ones_like(dK_eq), where=rates.dK_eq > 0)
+        kinds = replace(kinds, dK=kinds.dK * growth_of_dK[None, :, None])
     return SolveHistory(
         sigma=np.zeros(1),
         rate=rate[None],
@@ -399,11 +412,11 @@ def _kink(
         with collected_warnings([]):
             return inputs.angle_of_K(clipped_K(K))
 
-    theta, converged = limit_angles(without_warning, clipped_K(inputs.K))
-    kinked = turns & converged
-    theta = np.where(kinked, theta, 0.0)
+    theta, is_converged = limit_angles(without_warning, clipped_K(inputs.K))
+    is_kinked = turns & is_converged
+    theta = np.where(is_kinked, theta, 0.0)
     opening = clipped_K(kinked_K(clipped_K(rates.K[:, rows]), theta))[..., 0]
-    return theta, _T_over_K(opening, rates.T[:, rows]), kinked
+    return theta, _T_over_K(opening, rates.T[:, rows]), is_kinked
 
 
 def turn_of_faces(rates: Rates, length: Floats) -> Floats:
@@ -424,9 +437,9 @@ def _T_over_K(K_I: Floats, T: Floats) -> Floats:
     """T over K_I of the state with the largest K_I of each tip `(f,)`; 0 where none opens it."""
     tip = np.arange(K_I.shape[1])
     state = np.argmax(K_I, axis=0)
-    opening, along = K_I[state, tip], T[state, tip]
-    opens = (opening > 0) & np.isfinite(along)
-    return np.asarray(np.where(opens, along, 0.0) / np.where(opens, opening, 1.0))
+    opening, T_of_tip = K_I[state, tip], T[state, tip]
+    is_opening = (opening > 0) & np.isfinite(T_of_tip)
+    return np.asarray(np.where(is_opening, T_of_tip, 0.0) / np.where(is_opening, opening, 1.0))
 
 
 # A solve: correct the step that led there.
@@ -457,7 +470,7 @@ def begin(rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
 
 
 def _stations(
-    cracks: Sequence[Crack], identities: Identities, x: Floats, fresh: Bools
+    cracks: Sequence[Crack], identities: Identities, x: Floats, is_fresh: Bools
 ) -> GrowthStations:
     """Tips of cracks whose growth has come to some places."""
     count = [crack.n_tips for crack in cracks]
@@ -474,7 +487,7 @@ def _stations(
         closed=np.zeros(n, dtype=bool),
         length=np.zeros(n),
         offset=x - last_faces(cracks).tip,
-        fresh=fresh,
+        fresh=is_fresh,
     )
 
 
@@ -486,14 +499,14 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         return _without_lost_tips(rule, last, rates, identities, rows)
     if np.isinf(rates.rate).any():
         return _last_step_of_run(last, rates, identities)
-    near = interfaces_ahead(rule, solves_of(last)[0].x, plan.move)
-    if near is not None and (plan.arc > near.way).any():
-        return _step_through_interface(rule, last, rates, identities, near)
+    interfaces = interfaces_ahead(rule, solves_of(last)[0].x, plan.move)
+    if interfaces is not None and (plan.arc > interfaces.way).any():
+        return _step_through_interface(rule, last, rates, identities, interfaces)
     return _corrected_points(rule, last, rates, identities)
 
 
 def _step_through_interface(
-    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, near: InterfacesAhead
+    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, interfaces: InterfacesAhead
 ) -> Corrected:
     """A step in which tips have passed into other materials: each part counts by its own law.
 
@@ -501,67 +514,79 @@ def _step_through_interface(
     Where K jumps, it is prolonged up to the interface, and is that of its end behind.
     """
     plan, error = plan_of(last), _error(last)
-    stations, old = solves_of(last)
-    crosses = plan.arc > near.way
+    stations, old_solves = solves_of(last)
+    is_crossing = plan.arc > interfaces.way
     kinds = kinds_of(rule, rates)
-    begin = old.last(1)
-    now = begin.with_solve(
+    begin = old_solves.last(1)
+    solves_now = begin.with_solve(
         plan.end, rates.law_rate, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
     )
-    jumps = crosses & ~near.is_smooth
-    here = np.where(jumps, rates_at(old.last(2), np.array([plan.end]))[0], rates.law_rate)
-    there = np.where(jumps, rates.law_rate, begin.rate[0])
-    smooth = crosses & near.is_smooth
-    if smooth.any():
-        sets = np.where(smooth, near.before, near.after)
-        before = rates_by_law_of(rule, rates.problem, rates.response, sets)
-        here = np.where(smooth, before, here)
-        there = np.where(smooth, rates_behind(rule, last, near), there)
-    history = old.with_solve(
-        plan.end, here, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
+    jumps = is_crossing & ~interfaces.is_smooth
+    rate_here = np.where(
+        jumps, rates_at(old_solves.last(2), np.array([plan.end]))[0], rates.law_rate
     )
-    after = replace(now, rate=np.stack([there, rates.law_rate]))
+    rate_there = np.where(jumps, rates.law_rate, begin.rate[0])
+    is_smooth = is_crossing & interfaces.is_smooth
+    if is_smooth.any():
+        sets = np.where(is_smooth, interfaces.before, interfaces.after)
+        rate_before = rates_by_law_of(rule, rates.problem, rates.response, sets)
+        rate_here = np.where(is_smooth, rate_before, rate_here)
+        rate_there = np.where(is_smooth, rates_behind(rule, last, interfaces), rate_there)
+    history = old_solves.with_solve(
+        plan.end, rate_here, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
+    )
+    solves_after = replace(solves_now, rate=np.stack([rate_there, rates.law_rate]))
     if jumps.any():
         history = replace(history, dK_eq=np.where(jumps, begin.dK_eq[0], history.dK_eq))
-        after = replace(after, dK_eq=np.where(jumps, rates.dK_eq, after.dK_eq))
-        history, after = _with_jumps(history, jumps, -2), _with_jumps(after, jumps, -1)
+        solves_after = replace(solves_after, dK_eq=np.where(jumps, rates.dK_eq, solves_after.dK_eq))
+        history, solves_after = (
+            _with_jumps(history, jumps, -2),
+            _with_jumps(solves_after, jumps, -1),
+        )
     if history.kinds is not None and begin.kinds is not None:
         history = replace(history, kinds=replace(history.kinds, sets=begin.kinds.sets))
-    stands = crosses & ~(rates.rate > 0)  # nothing grows behind: the run ends there
-    after = replace(after, rate=np.where(stands, history.rate[-2:], after.rate))
-    goal = np.where(crosses, plan.arc, np.inf)
+    is_standing = is_crossing & ~(rates.rate > 0)  # nothing grows behind: the run ends there
+    solves_after = replace(
+        solves_after, rate=np.where(is_standing, history.rate[-2:], solves_after.rate)
+    )
+    goal = np.where(is_crossing, plan.arc, np.inf)
 
-    def solves_in(passed: Bools) -> SolveHistory:
-        return mixed_solves(history.last(2), after, near.after, passed) if passed.any() else history
+    def solves_in(is_passed: Bools) -> SolveHistory:
+        return (
+            mixed_solves(history.last(2), solves_after, interfaces.after, is_passed)
+            if is_passed.any()
+            else history
+        )
 
-    for most in _LONGER * plan.length:
-        done = passage(
+    for largest_length in _LONGER * plan.length:
+        passage_done = passage(
             rule,
             rates.stations.frame,
             solves_in,
-            near,
+            interfaces,
             goal,
             plan.sigma,
-            most,
+            largest_length,
             last.zones,
         )
-        if (done.growth.arc >= goal * (1 - 1e-9)).any():
+        if (passage_done.growth.arc >= goal * (1 - 1e-9)).any():
             break
-    cycles, cycles_at = done.growth.cycles, np.array(done.cycles_at)
+    cycles, cycles_at = passage_done.growth.cycles, np.array(passage_done.cycles_at)
     row = int(np.argmax(np.where(jumps, plan.arc, -1.0)))
     if jumps[row] and last.zones is None and rates.rate[row] > 0:
-        behind = float(plan.arc[row] - near.way[row])
+        way_behind = float(plan.arc[row] - interfaces.way[row])
         first, second = cycles_of_jump(
-            old, history.exponent, float(rates.law_rate[row]), row, float(near.way[row]), behind,
-            float(near.power[row]),
+            old_solves, history.exponent, float(rates.law_rate[row]), row,
+            float(interfaces.way[row]), way_behind,
+            float(interfaces.power[row]),
         )  # fmt: skip
         cycles, cycles_at[row] = first + second, first
-    warn_of_passages(rule, last, near, cycles_at)
+    warn_of_passages(rule, last, interfaces, cycles_at)
     after_it = _stations(
         rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves
     )
-    goes_on = not jumps.any() and plan.sigma > 0 and bool((crosses | (rates.rate == 0)).all())
-    solves = replace(after, kinds=now.kinds) if goes_on else first_solves(rule, rates)
+    goes_on = not jumps.any() and plan.sigma > 0 and bool((is_crossing | (rates.rate == 0)).all())
+    solves = replace(solves_after, kinds=solves_now.kinds) if goes_on else first_solves(rule, rates)
     own_error = share_left(rule) * abs(cycles - plan.cycles) + plan.error
     own_error += solves.exponent * error.behind * cycles
     return Corrected(
@@ -571,7 +596,7 @@ def _step_through_interface(
         solves,
         StepError(error.place, error.cycles + own_error, behind=error.behind),
         last.control if goes_on else _first_length(rule, after_it, solves, rates),
-        done.zones,
+        passage_done.zones,
     )
 
 
@@ -592,24 +617,24 @@ def _corrected_points(
 ) -> Corrected:
     """Correct the last points by the parabola through the last three solves."""
     plan, error = plan_of(last), _error(last)
-    stations, old = solves_of(last)
+    stations, old_solves = solves_of(last)
     faces = last_faces(rates.cracks)
-    solves = old.with_solve(
+    solves = old_solves.with_solve(
         plan.end, rates.law_rate, rates.dK_eq, rates.direction, rates.exponent(rule.law),
         kinds_of(rule, rates),
     )  # fmt: skip
     stretch = stretch_of(rule, solves, plan.sigma, plan.length, last.zones)
     frame = rates.stations.frame
     angle = solves.angles(frame)
-    solved = np.array(angle[-1])
+    solved_angle = np.array(angle[-1])
     gamma = np.where(plan.moves, turn_of_faces(rates, faces.length), 0.0)
-    begin_of_face = _begins(last, plan)
+    begin_of_face = _begins_of_faces(last, plan)
     growth = Growth(plan.move, plan.arc, plan.cycles)
     for _ in range(_PASSES):
         growth = stretch.growth(frame, angle)
         face = stations.x + growth.move - begin_of_face
         local = np.einsum("nij,nj->in", frame, face)
-        angle[-1] = solved + gamma * np.arctan2(local[1], local[0])
+        angle[-1] = solved_angle + gamma * np.arctan2(local[1], local[0])
     solves = solves.with_direction(replace(rates, angle=angle[-1]).direction)
     x = stations.x + growth.move
     try:
@@ -619,39 +644,42 @@ def _corrected_points(
     gap = x - (stations.x + plan.move)
     spans = _spans(rule, last, stretch)
     by_places = _places(rule, last, solves, spans, frame, gap)
-    known, newest = by_places.known, by_places.newest
+    known_error, newest_error = by_places.known, by_places.newest
     cycles, of_life = _cycles(rule, last, spans, growth)
     lag = _OF_LENGTH * by_places.ahead / solves.scale
-    behind = error.behind + float(lag[0].max(initial=0.0))
+    lag_behind = error.behind + float(lag[0].max(initial=0.0))
     # What an end lags behind by after this step counts in all cycles that follow.
-    whole = max(growth.cycles, PAST * last.cycles)
-    alone = of_life.alone + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole
+    whole_cycles = max(growth.cycles, PAST * last.cycles)
+    cycle_error_alone = (
+        of_life.alone + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole_cycles
+    )
     cycle_error = of_life.known + of_life.newest - error.newest_cycles
-    cycle_error += solves.exponent * behind * growth.cycles
-    after = _stations(cracks, identities, x, stations.fresh | moves)
+    cycle_error += solves.exponent * lag_behind * growth.cycles
+    stations_after = _stations(cracks, identities, x, stations.fresh | moves)
     # A tip that is astray turns its next face by a share of that: where T > 0 it goes farther so.
-    astray = 1 + _ASTRAY * np.maximum(gamma, 0.0)
-    off = astray * by_places.off
+    drift = 1 + _ASTRAY * np.maximum(gamma, 0.0)
+    place_error = drift * by_places.off
     control = next_control(
-        rule, last.control, plan.length, float(off.max(initial=0.0)), alone, growth.cycles,
-        last.cycles, *_room(rule, after, solves, rates, last.cycles + cycles), plan.sigma,
+        rule, last.control, plan.length, float(place_error.max(initial=0.0)), cycle_error_alone,
+        growth.cycles,
+        last.cycles, *_room(rule, stations_after, solves, rates, last.cycles + cycles), plan.sigma,
     )  # fmt: skip
-    before = np.concatenate([np.zeros(0), *error.place])
+    error_before = np.concatenate([np.zeros(0), *error.place])
     if error.newest_place:
-        before -= np.concatenate(error.newest_place)
-    place = astray * before + known + newest
-    fastest = int(np.argmax(plan.arc))
+        error_before -= np.concatenate(error.newest_place)
+    place = drift * error_before + known_error + newest_error
+    fastest_row = int(np.argmax(plan.arc))
     return Corrected(
         last.cycles + cycles,
         tuple(cracks),
-        after,
+        stations_after,
         solves,
         StepError(
             rates.split(place),
             error.cycles + cycle_error,
-            K_place=float(astray[fastest]) * error.K_place,
-            behind=behind,
-            newest_place=rates.split(newest),
+            K_place=float(drift[fastest_row]) * error.K_place,
+            behind=lag_behind,
+            newest_place=rates.split(newest_error),
             newest_cycles=of_life.newest,
         ),
         control,
@@ -693,7 +721,7 @@ def _room(
     room = np.inf if hit is None else float(np.linalg.norm(hit[0] - x))
     if len(stations) == 1 and leaves(rule, room, float(solves.rate[-1, tip]), cycles):
         room = np.inf
-    return shortest(float(cell_sizes(mesh, x[None])[0]), float(rates.angle[tip])), room
+    return shortest_length(float(cell_sizes(mesh, x[None])[0]), float(rates.angle[tip])), room
 
 
 @dataclass(frozen=True, eq=False)
@@ -763,33 +791,34 @@ def _places(
     The error is between them. In this step, of which no second one is known yet, it is to the
     difference from a line as it was in that, and grows with the length.
     """
-    plan, old = plan_of(last), solves_of(last)[1]
-    along = solves.direction[-1]
-    size, arc = np.linalg.norm(gap, axis=1), np.abs((gap * along).sum(axis=1))
-    none = np.zeros(len(size))
+    plan, old_solves = plan_of(last), solves_of(last)[1]
+    direction = solves.direction[-1]
+    size, arc = np.linalg.norm(gap, axis=1), np.abs((gap * direction).sum(axis=1))
+    no_error = np.zeros(len(size))
     if last.zones is not None:
-        share = share_left(rule) * (_FIRST_OF_PLACE if old.n_solves == 1 else 1.0)
-        return _PlacesError(share * size, none, share * size, np.stack([share * arc, none]))
+        share = share_left(rule) * (_FIRST_OF_PLACE if old_solves.n_solves == 1 else 1.0)
+        return _PlacesError(share * size, no_error, share * size, np.stack([share * arc, no_error]))
     by_gap, arc = _OF_GAP * size, _OF_GAP * arc
-    if old.n_solves == 1:
-        return _PlacesError(by_gap, none, by_gap, np.stack([arc, none]))
+    if old_solves.n_solves == 1:
+        return _PlacesError(by_gap, no_error, by_gap, np.stack([arc, no_error]))
 
-    angle, old_angle = solves.angles(frame), old.angles(frame)
-    now = spans.curve.growth(frame, angle).move - spans.line.growth(frame, angle[-2:]).move
+    angle, old_angle = solves.angles(frame), old_solves.angles(frame)
+    move_now = spans.curve.growth(frame, angle).move - spans.line.growth(frame, angle[-2:]).move
     line, then, new = spans.before
     move = then.growth(frame, old_angle).move
-    before = new.growth(frame, angle).move - move
-    ratio, move_length = np.ones(len(size)), np.linalg.norm(before, axis=1)
-    if old.n_solves > 2:
-        was = np.linalg.norm(move - line.growth(frame, old_angle[-2:]).move, axis=1)
-        longer = plan.length / float(solves.sigma[-2] - solves.sigma[-3])
-        ratio = np.divide(longer * move_length, was, out=ratio, where=was > 0)
+    move_before = new.growth(frame, angle).move - move
+    ratio, move_length = np.ones(len(size)), np.linalg.norm(move_before, axis=1)
+    if old_solves.n_solves > 2:
+        move_error = np.linalg.norm(move - line.growth(frame, old_angle[-2:]).move, axis=1)
+        length_ratio = plan.length / float(solves.sigma[-2] - solves.sigma[-3])
+        ratio = np.divide(length_ratio * move_length, move_error, out=ratio, where=move_error > 0)
         ratio = np.clip(ratio, *_RATIOS_OF_PLACE)
-    newest = ratio * np.linalg.norm(now, axis=1)
-    ahead = np.stack([
-        arc + np.abs((before * along).sum(axis=1)), ratio * np.abs((now * along).sum(axis=1))
+    newest_error = ratio * np.linalg.norm(move_now, axis=1)
+    errors_ahead = np.stack([
+        arc + np.abs((move_before * direction).sum(axis=1)),
+        ratio * np.abs((move_now * direction).sum(axis=1))
     ])  # fmt: skip
-    return _PlacesError(by_gap + move_length, newest, by_gap + newest, ahead)
+    return _PlacesError(by_gap + move_length, newest_error, by_gap + newest_error, errors_ahead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -808,16 +837,16 @@ def _cycles(
     rule: GrowthRule, last: Step, spans: _Spans, growth: Growth
 ) -> tuple[float, _CyclesError]:
     """Cycles of a corrected step, and their estimated error."""
-    plan, old, share = plan_of(last), solves_of(last)[1], share_left(rule)
-    if old.n_solves == 1:
-        off = abs(growth.cycles - plan.cycles)
+    plan, old_solves, share = plan_of(last), solves_of(last)[1], share_left(rule)
+    if old_solves.n_solves == 1:
+        cycle_difference = abs(growth.cycles - plan.cycles)
         # The parabola of the next step mends it: of that, a square is left.
-        rest = _MENDED * share * off**2 / growth.cycles if growth.cycles > 0 else 0.0
-        return growth.cycles, _CyclesError(rest, 0.0, _FIRST * share * off)
+        rest = _MENDED * share * cycle_difference**2 / growth.cycles if growth.cycles > 0 else 0.0
+        return growth.cycles, _CyclesError(rest, 0.0, _FIRST * share * cycle_difference)
     line_error = share * abs(growth.cycles - spans.line.arcs()[1])
-    if old.n_solves > 2:
+    if old_solves.n_solves > 2:
         return growth.cycles, _better_known(rule, last, spans, line_error)
-    if old.sigma[0] > 0:  # the step before has passed an interface
+    if old_solves.sigma[0] > 0:  # the step before has passed an interface
         return growth.cycles, _CyclesError(line_error, 0.0, line_error)
     # The second step: the parabola tells what the first one, along a line, was off.
     line, curve = (span.arcs()[1] for span in spans.before[1:])
@@ -832,40 +861,46 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
     is between them, so that their difference takes the place of what was reckoned with then; the
     error of this step, of which no second parabola is known yet, is taken to be smaller likewise.
     """
-    old, before = solves_of(last)[1], _error(last).newest_cycles
+    old_solves, cycles_before = solves_of(last)[1], _error(last).newest_cycles
     if last.zones is not None:
-        return _CyclesError(line_error, line_error + before, 0.0)
+        return _CyclesError(line_error, line_error + cycles_before, 0.0)
 
     share = share_left(rule)
     line, then, new = (span.arcs()[1] for span in spans.before)
-    was, now = share * abs(then - line), abs(then - new)
-    longer = plan_of(last).length / float(old.sigma[2] - old.sigma[1])
-    newest = line_error * (float(np.clip(longer * now / was, *_RATIOS)) if was > 0 else 1.0)
-    if old.sigma[0] == 0:  # the first step of all is spanned by one parabola: the next is prolonged
+    error_before, error_now = share * abs(then - line), abs(then - new)
+    length_ratio = plan_of(last).length / float(old_solves.sigma[2] - old_solves.sigma[1])
+    newest_error = line_error * (
+        float(np.clip(length_ratio * error_now / error_before, *_RATIOS))
+        if error_before > 0
+        else 1.0
+    )
+    if (
+        old_solves.sigma[0] == 0
+    ):  # the first step of all is spanned by one parabola: the next is prolonged
         line, then, new = (
-            Stretch(each, 0.0, float(old.sigma[1]), rule.threshold).arcs()[1]
-            for each in (old.first(2), old, spans.curve.solves)
+            Stretch(each, 0.0, float(old_solves.sigma[1]), rule.threshold).arcs()[1]
+            for each in (old_solves.first(2), old_solves, spans.curve.solves)
         )
-        prolonged, was = _RATIO_OF_PROLONGED * abs(then - new), abs(then - line)
-        now += min(prolonged, _RATIO_OF_FIRST * share * was)
-    return _CyclesError(newest, now, newest)
+        prolonged_error, error_before = _RATIO_OF_PROLONGED * abs(then - new), abs(then - line)
+        error_now += min(prolonged_error, _RATIO_OF_FIRST * share * error_before)
+    return _CyclesError(newest_error, error_now, newest_error)
 
 
-def _begins(last: Step, plan: Plan) -> Floats:
+def _begins_of_faces(last: Step, plan: Plan) -> Floats:
     """Where the last faces of the predicted cracks begin `(n, 2)`."""
     faces: Faces = last_faces(last.corrected)
-    instead = moved_on(faces, solves_of(last)[0].fresh, plan.cell)
-    return np.where(instead[:, None], faces.anchor, faces.tip)
+    is_replaced = moved_on(faces, solves_of(last)[0].fresh, plan.cell)
+    return np.where(is_replaced[:, None], faces.anchor, faces.tip)
 
 
-def _rows_that_stay(ends: Floats, placed: Sequence[Crack]) -> Ints:
+def _rows_that_stay(ends: Floats, placed_cracks: Sequence[Crack]) -> Ints:
     """Rows of the advanced tips that the placed ones are `(n,)`: some have left or joined."""
     row = {tuple(x): k for k, x in enumerate(ends.tolist())}
-    return np.array([row[tuple(x)] for x in last_faces(placed).tip.tolist()], dtype=np.int64)
+    return np.array([row[tuple(x)] for x in last_faces(placed_cracks).tip.tolist()], dtype=np.int64)
 
 
 def _without_lost_tips(
-    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, stays: Ints
+    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, rows_that_stay: Ints
 ) -> Corrected:
     """Begin anew after tips have left the body or met: their solves say nothing of the others now.
 
@@ -873,23 +908,25 @@ def _without_lost_tips(
     new rates count.
     """
     plan, error = plan_of(last), _error(last)
-    before = solves_of(last)[0]
-    x = (before.x + plan.move)[stays]
-    stations = _stations(rates.cracks, identities, x, (before.fresh | plan.moves)[stays])
+    stations_before = solves_of(last)[0]
+    x = (stations_before.x + plan.move)[rows_that_stay]
+    stations = _stations(
+        rates.cracks, identities, x, (stations_before.fresh | plan.moves)[rows_that_stay]
+    )
     solves = first_solves(rule, rates)
-    known = solves_of(last)[1].last(2)
-    ahead = stretch_of(rule, known, plan.sigma, plan.length, last.zones)
-    zones = ahead.zones if ahead.marched is not None else None
-    zones = None if zones is None else zones.at(stays)
-    lost_rows = np.setdiff1d(np.arange(len(plan.arc)), stays)
-    exit_ = _exit(rule, last, ahead, lost_rows)
+    last_solves = solves_of(last)[1].last(2)
+    stretch_ahead = stretch_of(rule, last_solves, plan.sigma, plan.length, last.zones)
+    zones = stretch_ahead.zones if stretch_ahead.integration is not None else None
+    zones = None if zones is None else zones.at(rows_that_stay)
+    lost_rows = np.setdiff1d(np.arange(len(plan.arc)), rows_that_stay)
+    exit_ = _exit(rule, last, stretch_ahead, lost_rows)
     rest = plan.length - exit_
-    cycles = ahead.arcs(exit_)[1] if rest > 0 else plan.cycles
+    cycles = stretch_ahead.arcs(exit_)[1] if rest > 0 else plan.cycles
     if 0 < rates.largest < np.inf and last.zones is None:
         cycles += rest / rates.largest
     elif rest > 0:
         cycles = plan.cycles
-    lost = np.concatenate(error.place)[stays]
+    place_error = np.concatenate(error.place)[rows_that_stay]
     cycle_error = share_left(rule) * abs(cycles - plan.cycles) + plan.error
     cycle_error += solves.exponent * error.behind * cycles
     return Corrected(
@@ -897,21 +934,23 @@ def _without_lost_tips(
         rates.cracks,
         stations,
         solves,
-        StepError(rates.split(lost), error.cycles + cycle_error, behind=error.behind),
+        StepError(rates.split(place_error), error.cycles + cycle_error, behind=error.behind),
         _first_length(rule, stations, solves, rates),
         zones,
     )
 
 
-def _exit(rule: GrowthRule, last: Step, ahead: Stretch, lost: Ints) -> float:
+def _exit(rule: GrowthRule, last: Step, stretch_ahead: Stretch, lost_rows: Ints) -> float:
     """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
     plan, mesh = plan_of(last), rule.problem.mesh
     stations = solves_of(last)[0]
-    if _is_inside(mesh, (stations.x + plan.move)[lost]):
+    if _is_inside(mesh, (stations.x + plan.move)[lost_rows]):
         return plan.length
 
     def holds(length: float) -> bool:
-        return _is_inside(mesh, (stations.x + _growth(stations, ahead, length).move)[lost])
+        return _is_inside(
+            mesh, (stations.x + _growth(stations, stretch_ahead, length).move)[lost_rows]
+        )
 
     return bisected_length(holds, plan.length)[1]
 
@@ -927,21 +966,23 @@ def _last_step_of_run(last: Step, rates: Rates, identities: Identities) -> Corre
     does it.
     """
     plan, error = plan_of(last), _error(last)
-    stations, old = solves_of(last)
-    cycles = 0.5 * plan.length / float(old.rate[-1].max())
+    stations, old_solves = solves_of(last)
+    cycles = 0.5 * plan.length / float(old_solves.rate[-1].max())
     if last.zones is not None:
         cycles = 0.5 * plan.cycles
-    after = _stations(rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves)
-    solves = replace(old, rate=np.vstack([old.rate[:-1], rates.law_rate]))
+    stations_after = _stations(
+        rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves
+    )
+    solves = replace(old_solves, rate=np.vstack([old_solves.rate[:-1], rates.law_rate]))
     return Corrected(
-        last.cycles + cycles, rates.cracks, after, solves,
+        last.cycles + cycles, rates.cracks, stations_after, solves,
         StepError(error.place, error.cycles + cycles), StepControl(), last.zones,
     )  # fmt: skip
 
 
-def cycles_until(rule: GrowthRule, step: Step, part: float, after: float | None) -> float:
+def cycles_until(rule: GrowthRule, step: Step, part: float, end_rate: float | None) -> float:
     """Cycles of a part of the advance after a step, by the line through two solves."""
-    del after  # behind the first exit other rates count
+    del end_rate  # behind the first exit other rates count
     plan, solves = plan_of(step), solves_of(step)[1]
     length = part * plan.length
     return stretch_of(rule, solves.last(2), plan.sigma, length, step.zones).arcs()[1]

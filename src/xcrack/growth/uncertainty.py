@@ -43,8 +43,8 @@ def uses_best(sif: SIF) -> Bools:
 
 
 def _best_K(sif: SIF) -> SIF:
-    known = uses_best(sif)
-    return replace(sif, K=np.where(known[:, None], sif.best, sif.K)) if known.any() else sif
+    is_known = uses_best(sif)
+    return replace(sif, K=np.where(is_known[:, None], sif.best, sif.K)) if is_known.any() else sif
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,24 +81,24 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
     """
     bar = [_stacked_K(sif, c, lambda s: s.bar) for c in range(len(rates.cracks))]
     parts = [_stacked_K(sif, c, _contact_part) for c in range(len(rates.cracks))]
-    known = np.concatenate([np.isfinite(b).all(axis=(0, 2)) for b in bar])
+    is_known = np.concatenate([np.isfinite(b).all(axis=(0, 2)) for b in bar])
     surface = np.concatenate([crack.at_surface for crack in sif[0]])
     rate, angle = rates.law_rate, rates.angle
     n = len(rate)
     total, contact, turn = np.zeros(n), np.zeros(n), np.zeros(n)
-    moved = _rates_of_moved_K(rule, rates, bar)
-    for mode, both in enumerate(moved):
-        change, turned = np.zeros(n), np.zeros(n)
+    moved_rates = _rates_of_moved_K(rule, rates, bar)
+    for mode, both in enumerate(moved_rates):
+        change, angle_change = np.zeros(n), np.zeros(n)
         for other_angle, other in both:
             change = np.maximum(change, _log_ratio(rate, other))
-            turned = np.maximum(turned, np.abs(other_angle - angle))
+            angle_change = np.maximum(angle_change, np.abs(other_angle - angle))
         share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(parts, bar)])
-        total, contact, turn = total + change, contact + share * change, turn + turned
-    fastest = float(rate[np.isfinite(rate)].max(initial=0.0))
-    counts = (rate >= _FAST * fastest) & (rate > 0) & ~surface
+        total, contact, turn = total + change, contact + share * change, turn + angle_change
+    fastest_rate = float(rate[np.isfinite(rate)].max(initial=0.0))
+    counts = (rate >= _FAST * fastest_rate) & (rate > 0) & ~surface
     if not counts.any():
         return RateError(np.nan, 0.0, np.nan)
-    if not known[counts].all() or np.isinf(rate[counts]).any():
+    if not is_known[counts].all() or np.isinf(rate[counts]).any():
         return RateError(np.nan, 0.0, np.nan)
     worst = int(np.argmax(np.where(counts, total, -1.0)))
     return RateError(float(total[worst]), float(contact[worst]), float(turn[counts].max()))
@@ -111,32 +111,32 @@ _WIDER = 1.3  # a solve later
 _STEADY = 1.5  # ratio of K of two solves, at most
 
 
-def foretold_bars(before: Answers, now: Answers) -> Answers | None:
+def foretold_bars(answers_before: Answers, answers_now: Answers) -> Answers | None:
     """K of all states and cracks with errors in proportion to it; None where they may be others.
 
     Parameters
     ----------
-    before : sequence of sequence of SIF
+    answers_before : sequence of sequence of SIF
         Of the last solve, with bars.
-    now : sequence of sequence of SIF
+    answers_now : sequence of sequence of SIF
         Without.
     """
-    if [len(state) for state in before] != [len(state) for state in now]:
+    if [len(state) for state in answers_before] != [len(state) for state in answers_now]:
         return None
     rows = []
-    for old, new in zip(before, now, strict=True):
-        cracks = [_with_foretold_bars(a, b) for a, b in zip(old, new, strict=True)]
+    for old_state, new_state in zip(answers_before, answers_now, strict=True):
+        cracks = [_with_foretold_bars(a, b) for a, b in zip(old_state, new_state, strict=True)]
         if any(crack is None for crack in cracks):
             return None
         rows.append(tuple(crack for crack in cracks if crack is not None))
     return tuple(rows)
 
 
-def _with_foretold_bars(old: SIF, new: SIF) -> SIF | None:
-    errors = old.errors
-    if errors is None or any(errors.reasons) or not np.array_equal(old.closed, new.closed):
+def _with_foretold_bars(old_sif: SIF, new_sif: SIF) -> SIF | None:
+    errors = old_sif.errors
+    if errors is None or any(errors.reasons) or not np.array_equal(old_sif.closed, new_sif.closed):
         return None
-    size = [np.linalg.norm(sif.K, axis=1) for sif in (old, new)]
+    size = [np.linalg.norm(sif.K, axis=1) for sif in (old_sif, new_sif)]
     if not np.array_equal(size[0] > 0, size[1] > 0):
         return None
     ratio = np.divide(size[1], size[0], out=np.ones_like(size[0]), where=size[0] > 0)[:, None]
@@ -144,47 +144,60 @@ def _with_foretold_bars(old: SIF, new: SIF) -> SIF | None:
         return None
     contact = None if errors.contact is None else _WIDER * ratio * errors.contact
     bar = _WIDER * ratio * errors.bar
-    return replace(new, errors=bars_of(ratio * errors.eta, bar, errors.reasons, contact))
+    return replace(new_sif, errors=bars_of(ratio * errors.eta, bar, errors.reasons, contact))
 
 
 def add_K_error(
     rule: GrowthRule,
     last: Step | None,
-    corrected: Corrected,
+    corrected_step: Corrected,
     rates: Rates,
     sif: Answers,
     is_foretold: bool = False,
 ) -> Corrected:
     """A settled step whose error also has what the bars of K have cost so far."""
-    if not rule.estimates or corrected.error is None:
-        return corrected
+    if not rule.estimates or corrected_step.error is None:
+        return corrected_step
     if is_foretold and last is not None and last.error is not None:  # in proportion to the bars
-        old = last.error
-        now = RateError(_WIDER * old.rate, _WIDER * old.rate_contact, _WIDER * old.turn)
+        old_error = last.error
+        rate_error_now = RateError(
+            _WIDER * old_error.rate, _WIDER * old_error.rate_contact, _WIDER * old_error.turn
+        )
     else:
-        now = rate_error(rule, rates, sif)
+        rate_error_now = rate_error(rule, rates, sif)
     if last is None or last.error is None:
-        error = replace(corrected.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0)
+        error = replace(
+            corrected_step.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0
+        )
     else:
-        before, cycles = last.error, corrected.cycles - last.cycles
-        both, parts = [before.rate, now.rate], [before.rate_contact, now.contact]
-        turns = [turn for turn in (before.turn, now.turn) if np.isfinite(turn)]
+        error_before, cycles = last.error, corrected_step.cycles - last.cycles
+        both, parts = (
+            [error_before.rate, rate_error_now.rate],
+            [error_before.rate_contact, rate_error_now.contact],
+        )
+        turns = [turn for turn in (error_before.turn, rate_error_now.turn) if np.isfinite(turn)]
         way = max((float(da.max(initial=0.0)) for da in last.da), default=0.0)
         # Of 2D tips it is known how errors of before have grown.
-        grown = corrected.error.K_place
-        K_place, share = (before.K_place, _ASTRAY) if np.isnan(grown) else (grown, 1.0)
+        drift = corrected_step.error.K_place
+        K_place, share = (error_before.K_place, _ASTRAY) if np.isnan(drift) else (drift, 1.0)
         of_K = [rate - part for rate, part in zip(both, parts) if np.isfinite(rate)]
         of_contact = [part for rate, part in zip(both, parts) if np.isfinite(rate)]
         error = replace(
-            corrected.error,
-            K=before.K + TOGETHER * 0.5 * cycles * sum(of_K),
-            contact=before.contact + 0.5 * cycles * sum(of_contact),
-            unknown=before.unknown + 0.5 * cycles * (2 - len(of_K)),
+            corrected_step.error,
+            K=error_before.K + TOGETHER * 0.5 * cycles * sum(of_K),
+            contact=error_before.contact + 0.5 * cycles * sum(of_contact),
+            unknown=error_before.unknown + 0.5 * cycles * (2 - len(of_K)),
             K_place=K_place + share * way * float(np.mean(turns) if turns else 0.0),
-            grown=before.grown + way,
+            grown=error_before.grown + way,
         )
     return replace(
-        corrected, error=replace(error, rate=now.rate, rate_contact=now.contact, turn=now.turn)
+        corrected_step,
+        error=replace(
+            error,
+            rate=rate_error_now.rate,
+            rate_contact=rate_error_now.contact,
+            turn=rate_error_now.turn,
+        ),
     )
 
 
@@ -207,10 +220,11 @@ def shortfall(rule: GrowthRule, last: Step) -> str:
     worst = max(shares, key=lambda name: shares[name])
     parts = ", ".join(f"{name} {share:.1e}" for name, share in shares.items() if share > 0)
     reasons = dict.fromkeys(r for state in last.sif for sif in state for r in sif.reasons if r)
-    why = f" ({'; '.join(reasons)})" if reasons and worst == "no bar" else ""
+    reasons_in_words = f" ({'; '.join(reasons)})" if reasons and worst == "no bar" else ""
     return (
         f"tolerance = {rule.tolerance:g} is not met at step {last.index}: the life is known to "
-        f"{life:.1e}, the path to {path:.1e} of the length grown, by {parts}. {_REMEDY[worst]}{why}"
+        f"{life:.1e}, the path to {path:.1e} of the length grown, by {parts}. "
+        f"{_REMEDY[worst]}{reasons_in_words}"
     )
 
 
@@ -248,7 +262,7 @@ def _moved_rates(
 ) -> tuple[Floats, Floats]:
     """Directions and rates with one mode of K moved by its bars."""
 
-    def moved(answers: Answers) -> Answers:
+    def moved_by_bars(answers: Answers) -> Answers:
         return tuple(
             tuple(
                 _with_K(crack, bar[c][min(k, len(bar[c]) - 1)], mode, sign)
@@ -257,12 +271,12 @@ def _moved_rates(
             for k, state in enumerate(answers)
         )
 
-    free = None
+    free_response = None
     if rates.free is not None:
-        free = replace(rates.free, sif=moved(rates.free.sif))
+        free_response = replace(rates.free, sif=moved_by_bars(rates.free.sif))
     with collected_warnings([]):  # they are of cracks that nobody has
-        response = replace(rates.response, sif=moved(rates.sif))
-        other = rates_of(rule, rates.problem, response, free)
+        response = replace(rates.response, sif=moved_by_bars(rates.sif))
+        other = rates_of(rule, rates.problem, response, free_response)
     return other.angle, other.law_rate
 
 
@@ -270,21 +284,23 @@ def _with_K(sif: SIF, bar: Floats, mode: int, sign: float) -> SIF:
     return replace(sif, K=_moved_K(sif.K, bar, mode, sign))
 
 
-def _moved_K(given: Floats, bar: Floats, mode: int, sign: float) -> Floats:
-    K = np.array(given)
+def _moved_K(K_of_solution: Floats, bar: Floats, mode: int, sign: float) -> Floats:
+    K = np.array(K_of_solution)
     K_of_mode = K[..., mode]
-    changed = K_of_mode + np.where(K_of_mode < 0, -sign, sign) * np.nan_to_num(bar[..., mode])
+    changed_K = K_of_mode + np.where(K_of_mode < 0, -sign, sign) * np.nan_to_num(bar[..., mode])
     if mode == 0:  # what is open does not overlap
-        changed = np.where(K_of_mode >= 0, np.maximum(changed, 0.0), changed)
-    K[..., mode] = changed
+        changed_K = np.where(K_of_mode >= 0, np.maximum(changed_K, 0.0), changed_K)
+    K[..., mode] = changed_K
     return K
 
 
 def _log_ratio(rate: Floats, other: Floats) -> Floats:
     """|ln| of the ratio of two rates; at most a whole where one of them is zero or infinite."""
-    good = (rate > 0) & np.isfinite(rate) & (other > 0) & np.isfinite(other)
-    ratio = np.where(good, other, 1.0) / np.where(good, rate, 1.0)
-    return np.asarray(np.where(good, np.abs(np.log(ratio)), np.where(rate == other, 0.0, _WHOLE)))
+    is_valid = (rate > 0) & np.isfinite(rate) & (other > 0) & np.isfinite(other)
+    ratio = np.where(is_valid, other, 1.0) / np.where(is_valid, rate, 1.0)
+    return np.asarray(
+        np.where(is_valid, np.abs(np.log(ratio)), np.where(rate == other, 0.0, _WHOLE))
+    )
 
 
 def _stacked_K(sif: Answers, c: int, part: Callable[[SIF], Floats]) -> Floats:

@@ -40,34 +40,36 @@ class Ahead:
     label: str
 
 
-def ahead_of(x: Floats, ahead: Floats, c: int, cracks: Sequence[Crack], mesh: Mesh) -> Ahead | None:
+def ahead_of(
+    x: Floats, direction: Floats, c: int, cracks: Sequence[Crack], mesh: Mesh
+) -> Ahead | None:
     """Boundary or crack straight ahead of a tip of crack c in 2D; None where nothing is."""
-    hit = exit_ahead(x, ahead, mesh)
+    hit = exit_ahead(x, direction, mesh)
     if hit is None:
         return None
     way = np.stack([x, hit[0]])
-    met = [(float(np.linalg.norm(hit[0] - x)), repr(hit[1]))]
+    obstacles = [(float(np.linalg.norm(hit[0] - x)), repr(hit[1]))]
     for k, crack in enumerate(cracks):
-        crossed = crossing_points(way, crack.points) if k != c else way[:0]
-        met += [(float(np.linalg.norm(y - x)), f"crack {k}") for y in crossed]
-    return Ahead(*min(met))
+        crossings = crossing_points(way, crack.points) if k != c else way[:0]
+        obstacles += [(float(np.linalg.norm(y - x)), f"crack {k}") for y in crossings]
+    return Ahead(*min(obstacles))
 
 
-def _depth_ahead(x: Floats, ahead: Floats, mesh: Mesh) -> float:
+def _depth_ahead(x: Floats, direction: Floats, mesh: Mesh) -> float:
     """Way from a place of a front straight ahead to the boundary in 3D; inf where none is met.
 
     Möller and Trumbore's intersection of a ray with triangles (1997, J. Graphics Tools 2, 21).
     """
     corner = mesh.points[mesh.facets[mesh.facet_to_cell[:, 1] < 0]]
     one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    across = np.cross(ahead, two)
-    volume = (one * across).sum(axis=1)
+    edge_normal = np.cross(direction, two)
+    volume = (one * edge_normal).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         gap = x - corner[:, 0]
-        u = (gap * across).sum(axis=1) / volume
-        turned = np.cross(gap, one)
-        v = turned @ ahead / volume
-        t = (turned * two).sum(axis=1) / volume
+        u = (gap * edge_normal).sum(axis=1) / volume
+        gap_normal = np.cross(gap, one)
+        v = gap_normal @ direction / volume
+        t = (gap_normal * two).sum(axis=1) / volume
     hit = (volume != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
     return float(t[hit].min(initial=np.inf))
 
@@ -179,11 +181,11 @@ def validity(
             continue
         largest, angle = _largest_K_eq(K, nu)
         places_of_crack = sif[0][c]
-        ahead = _directions(places_of_crack, angle)
+        directions = _directions(places_of_crack, angle)
         size = _size(crack, mesh)
-        inside = ~places_of_crack.at_surface
-        inside = inside if inside.any() else np.ones(len(inside), dtype=bool)
-        for j in np.nonzero(inside)[0].tolist():
+        is_inside = ~places_of_crack.at_surface
+        is_inside = is_inside if is_inside.any() else np.ones(len(is_inside), dtype=bool)
+        for j in np.nonzero(is_inside)[0].tolist():
             place = f"crack {c}, {coordinates(places_of_crack.x[j])}"
             judge("K", float(largest[j]), place)
             if K_c is not None:
@@ -196,15 +198,15 @@ def validity(
             judge("zone", zone, place)
             judge("of_crack", zone / size, place)
             if mesh.dim == 3:
-                way = _depth_ahead(places_of_crack.x[j], ahead[j], mesh)
+                way = _depth_ahead(places_of_crack.x[j], directions[j], mesh)
                 judge("of_ligament", zone / way, place)
                 continue
-            met = ahead_of(places_of_crack.x[j], ahead[j], c, cracks, mesh)
-            if met is not None:
-                judge("of_ligament", zone / met.length, f"{place}, towards {met.label}")
+            obstacle = ahead_of(places_of_crack.x[j], directions[j], c, cracks, mesh)
+            if obstacle is not None:
+                judge("of_ligament", zone / obstacle.length, f"{place}, towards {obstacle.label}")
                 for solution in solutions:
-                    load = _section(solution, places_of_crack.x[j], ahead[j], met.length)
-                    judge("of_section", load / yield_stress, f"{place}, towards {met.label}")
+                    load = _section(solution, places_of_crack.x[j], directions[j], obstacle.length)
+                    judge("of_section", load / yield_stress, f"{place}, towards {obstacle.label}")
     if "K" not in worst:
         return None
     if yield_stress is not None:
@@ -217,10 +219,10 @@ def validity(
 def _largest_K_eq(K: Floats, nu: float) -> tuple[Floats, Floats]:
     """Largest equivalent factor of the states `(f,)`, and the direction in that state."""
     angle = kink_angle(K)
-    equivalent = equivalent_K(K, angle, nu)
-    row = equivalent.argmax(axis=0)
+    K_eq = equivalent_K(K, angle, nu)
+    row = K_eq.argmax(axis=0)
     column = np.arange(K.shape[1])
-    return equivalent[row, column], angle[row, column]
+    return K_eq[row, column], angle[row, column]
 
 
 def _directions(places: SIF, angle: Floats) -> Floats:
@@ -239,7 +241,7 @@ _X, _W = np.polynomial.legendre.leggauss(40)
 _INSIDE = 1e-6  # share of a ligament at its ends: points lie in the body
 
 
-def _section(solution: Solution, x: Floats, ahead: Floats, length: float) -> float:
+def _section(solution: Solution, x: Floats, direction: Floats, length: float) -> float:
     """Yield stress at which force and moment on a ligament of a plane body make it yield.
 
     A strip of width b yields under N and M where (N / b s)² + |4 M / b² s| = 1: the stress s is the
@@ -248,13 +250,13 @@ def _section(solution: Solution, x: Floats, ahead: Floats, length: float) -> flo
     turn = 0.25 * np.pi * (_X + 1)
     share = _INSIDE + (1 - 2 * _INSIDE) * np.sin(turn) ** 2
     weight = 0.25 * np.pi * _W * np.sin(2 * turn)
-    points = x + length * share[:, None] * ahead
+    points = x + length * share[:, None] * direction
     weight = weight * solution.inside(points)
     points = points[weight > 0]
     weight, share = weight[weight > 0], share[weight > 0]
     if not len(points):
         return 0.0
-    normal = np.array([-ahead[1], ahead[0]])
+    normal = np.array([-direction[1], direction[0]])
     stress = np.einsum("qij,i,j->q", solution.stress(points), normal, normal)
     force = abs(float(weight @ stress))  # over b
     moment = abs(4 * float(weight @ (stress * (share - 0.5))))  # 4 M / b²

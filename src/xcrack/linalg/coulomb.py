@@ -51,7 +51,7 @@ class FrictionRows:
     mu: Floats
     stiffness: float
     compliance: Floats | None = None
-    augmented: bool = False
+    is_augmented: bool = False
 
     @property
     def n(self) -> int:

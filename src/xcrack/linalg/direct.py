@@ -158,8 +158,8 @@ class DirectSystem:
         f: Floats,
         u_imposed: Floats,
         start: Sequence[Bools | None],
-        latest: Floats | None = None,
-        opened: Floats | None = None,
+        last_solution: Floats | None = None,
+        u_opened: Floats | None = None,
     ) -> list[StateContact]:
         """Solve load states with crack faces that may touch; see `Engine`.
 
@@ -167,9 +167,9 @@ class DirectSystem:
         alone, F = Y^T Y and the gaps of the open faces are Y^T (L^-1 f). One backward half then
         gives the displacements with contact.
         """
-        del latest
+        del last_solution
         if self.factor is None:
-            return self._contact_by_solves(rows, f, u_imposed, start, opened)
+            return self._contact_by_solves(rows, f, u_imposed, start, u_opened)
         condensed = self.condense(rows.N, f, u_imposed)
         states = self._sets(condensed.dual, condensed.gap, rows, start)
         u = condensed.displacements(np.stack([state.pressure for state in states], axis=1))
@@ -217,9 +217,9 @@ class DirectSystem:
         f: Floats,
         u_imposed: Floats,
         start: Sequence[Bools | None],
-        opened: Floats | None,
+        u_opened: Floats | None,
     ) -> list[StateContact]:
-        d = rows.N @ (self.solve(f, u_imposed) if opened is None else opened)
+        d = rows.N @ (self.solve(f, u_imposed) if u_opened is None else u_opened)
         F = self.dual(rows.N)
         states = self._sets(F, d, rows, start)
         pressure = np.stack([state.pressure for state in states], axis=1)
@@ -349,7 +349,7 @@ def _verified_solver(solver: Solver, A: sp.csc_matrix) -> Solve:
             f"solver returned {value_text(solve)}: it must return a function of right-hand sides."
         )
 
-    def verified(b: Floats) -> Floats:
+    def solve_and_check(b: Floats) -> Floats:
         x = numbers(
             call_function(solve, "solver=", b),
             "what the solver returned",
@@ -371,7 +371,7 @@ def _verified_solver(solver: Solver, A: sp.csc_matrix) -> Solve:
             )
         return x
 
-    return verified
+    return solve_and_check
 
 
 def scaled_basis(

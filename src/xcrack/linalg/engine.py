@@ -244,8 +244,8 @@ class Engine(Protocol):
         f: Floats,
         u_imposed: Floats,
         start: Sequence[Bools | None],
-        latest: Floats | None = None,
-        opened: Floats | None = None,
+        last_solution: Floats | None = None,
+        u_opened: Floats | None = None,
     ) -> list[StateContact]:
         """Solve load states with crack faces that may touch.
 
@@ -255,7 +255,7 @@ class Engine(Protocol):
         f, u_imposed : (n_dof, states) arrays
         start : sequence of (g,) arrays of bool or None
             First guess of each state's closed set.
-        latest, opened : (n_dof, states) arrays, optional
+        last_solution, u_opened : (n_dof, states) arrays, optional
             The last displacements, and those with open faces.
         """
         ...

@@ -200,7 +200,7 @@ class IterativeSystem:
     operator: Operator
     blocks: Blocks
     block_basis: sp.csr_matrix | None = None
-    back: sp.csr_matrix | None = None
+    inverse_basis: sp.csr_matrix | None = None
     count: SolveCount = field(default_factory=SolveCount)
     shared: str = "multigrid hierarchy"
     reason: str = "conjugate gradients: a large body in 3D"
@@ -223,11 +223,13 @@ class IterativeSystem:
             Residual relative to the load at which to stop.
         """
         columns = f.reshape(len(f), -1)
-        imposed = np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
-        b, known_of = _vectors(self._loads_on_unknowns(columns, imposed)), _vectors(imposed)
+        u_columns = (
+            np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
+        )
+        b, known_of = _vectors(self._loads_on_unknowns(columns, u_columns)), _vectors(u_columns)
         y: list[Floats] = [np.zeros_like(each) for each in b]
         if start is not None:
-            y = _vectors(self.coordinates(start.reshape(columns.shape) - imposed))
+            y = _vectors(self.coordinates(start.reshape(columns.shape) - u_columns))
         first = independent_columns(b)
         others = [k for k in range(len(b)) if k not in first]
         self._solve_apart(first, b, known_of, y, tolerance)
@@ -235,7 +237,7 @@ class IterativeSystem:
         for k, guess in zip(others, guesses, strict=True):
             y[k] = guess
         self._solve_apart(others, b, known_of, y, tolerance)
-        return np.asarray(imposed + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
+        return np.asarray(u_columns + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
 
     def first_look(
         self, f: Floats, u_imposed: Floats, closed_before: bool
@@ -251,21 +253,21 @@ class IterativeSystem:
         f: Floats,
         u_imposed: Floats,
         start: Sequence[Bools | None],
-        latest: Floats | None = None,
-        opened: Floats | None = None,
+        last_solution: Floats | None = None,
+        u_opened: Floats | None = None,
     ) -> list[StateContact]:
         """Solve load states with crack faces that may touch; see `Engine`.
 
         Without a first set, that of the groups that overlap in the latest displacements is the
         best guess. Without displacements each state starts from those before it.
         """
-        del opened
+        del u_opened
         rows_in_basis = sp.csr_matrix(rows.N @ self.basis)
         b = _vectors(self._loads_on_unknowns(f, u_imposed))
         gaps = _vectors(rows.N @ u_imposed)
         y = [np.zeros_like(each) for each in b]
-        if latest is not None:
-            y = _vectors(self.coordinates(latest - u_imposed))
+        if last_solution is not None:
+            y = _vectors(self.coordinates(last_solution - u_imposed))
         # What a pressure closes, a multiple of the load closes too, and nothing else.
         right_hand_sides = np.concatenate([np.stack(b, axis=1), u_imposed])
         row_alike, scale = proportional_columns(right_hand_sides, _MULTIPLE)
@@ -388,9 +390,11 @@ class IterativeSystem:
         if self.node_entries is not None:
             return self.node_entries
         assert self.block_basis is not None
-        assert self.back is not None
+        assert self.inverse_basis is not None
         K = nearby_unknowns(_joined_rows(self.matrix), self.block_basis, self.blocks)
-        return sp.csr_matrix(self.back.T @ within_blocks(K, self.blocks) @ self.back)
+        return sp.csr_matrix(
+            self.inverse_basis.T @ within_blocks(K, self.blocks) @ self.inverse_basis
+        )
 
 
 def _joined_rows(K: sp.csr_matrix | Stiffness, rows: Bools | None = None) -> sp.csr_matrix:

@@ -188,7 +188,7 @@ def factorise(
     A: sp.csc_matrix,
     columns: tuple[Ints, Ints, int, Ints, int],
     tree: Tree,
-    previous: Factor | None = None,
+    previous_factor: Factor | None = None,
     keep: bool = False,
 ) -> Factor | None:
     """Factor a symmetric matrix; None where it is not positive definite.
@@ -201,7 +201,7 @@ def factorise(
         Rows of the basis that A belongs to, CSR, and its number of columns; the node of each
         function, and the number of components.
     tree : Tree
-    previous : Factor, optional
+    previous_factor : Factor, optional
         Of an earlier crack on the same tree, made to be kept.
     keep : bool
         Keep what the next factorisation may take over.
@@ -241,19 +241,19 @@ def factorise(
     previous_memory: tuple[Floats, ...] = ()
     if (
         keep
-        and previous is not None
-        and previous.tree is tree
-        and previous.subtree_levels == lowest_height <= depth
+        and previous_factor is not None
+        and previous_factor.tree is tree
+        and previous_factor.subtree_levels == lowest_height <= depth
     ):
         chosen_parts = _parts_to_factor(
-            ~unchanged_parts(fronts, previous.fronts), order, rank, height, lowest_height
+            ~unchanged_parts(fronts, previous_factor.fronts), order, rank, height, lowest_height
         )
-        previous_memory = previous.memory
+        previous_memory = previous_factor.memory
     panels, panel = _room(np.where(chosen_parts, panel_size, 0))
     updates, update = _room(np.where(chosen_parts, own_size, 0))
-    if previous_memory and previous is not None:
-        panel = np.where(chosen_parts, panel, previous.panel)
-        update = np.where(chosen_parts, update, previous.update)
+    if previous_memory and previous_factor is not None:
+        panel = np.where(chosen_parts, panel, previous_factor.panel)
+        update = np.where(chosen_parts, update, previous_factor.update)
     if _factor_subtrees(
         fronts, panel, update, (place, is_packed, height, chosen_parts), stacks, level
     ):

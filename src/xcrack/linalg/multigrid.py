@@ -528,14 +528,14 @@ def _prolongator(
         factor[idle_rows] = 0.0
     damped_factor = factor.reshape(n, -1)
 
-    def smoothed(first: int) -> sp.bsr_matrix:
+    def smooth_rows(first: int) -> sp.bsr_matrix:
         image = _rows(A, first) @ T
         damped_rows = damped_factor[first : first + _ROWS]
         image.data *= np.repeat(damped_rows, np.diff(image.indptr), axis=0)[:, :, None]
         return _rows(T, first) - image
 
     # Of all rows at once the image takes more memory than the result.
-    return _stacked_rows(list(stream_tasks(smoothed, range(0, n, _ROWS)))), coarse_motions
+    return _stacked_rows(list(stream_tasks(smooth_rows, range(0, n, _ROWS)))), coarse_motions
 
 
 def _stacked_rows(parts: list[sp.bsr_matrix]) -> sp.bsr_matrix:

@@ -87,7 +87,7 @@ def in_lockstep(K: Operator, iterations: Sequence[Iteration[Result]]) -> list[Re
     """
     results: list[Any] = [None] * len(iterations)
 
-    def advanced(task: tuple[int, Floats | None]) -> VectorRequest | None:
+    def advance_run(task: tuple[int, Floats | None]) -> VectorRequest | None:
         k, answer = task
         try:
             return iterations[k].send(cast(Floats, answer))
@@ -103,7 +103,7 @@ def in_lockstep(K: Operator, iterations: Sequence[Iteration[Result]]) -> list[Re
         tasks += [(k, None) for k in itertools.islice(next_numbers, free_places)]
         if not tasks and not waiting_tasks:
             return cast(list[Result], results)
-        for (k, _), request in zip(tasks, map_tasks(advanced, tasks), strict=True):
+        for (k, _), request in zip(tasks, map_tasks(advance_run, tasks), strict=True):
             if request is not None:
                 waiting_tasks[k] = request
         tasks = []
@@ -160,18 +160,18 @@ class _Plane:
     rows: sp.csr_matrix
     offset: Floats
     scale: Floats
-    lifted: sp.csr_matrix
+    scaled_rows: sp.csr_matrix
     solve: Apply
 
     def nearest(self, y: Floats) -> Floats:
-        return y - self.lifted @ self.solve(self.rows @ y + self.offset)
+        return y - self.scaled_rows @ self.solve(self.rows @ y + self.offset)
 
     def project(self, z: Floats) -> Floats:
-        return z - self.lifted @ self.solve(self.rows @ z)
+        return z - self.scaled_rows @ self.solve(self.rows @ z)
 
     def pressure_of(self, r: Floats) -> Floats:
         """Multipliers of the part of a residual that pressures carry."""
-        return self.solve(self.lifted.T @ r)
+        return self.solve(self.scaled_rows.T @ r)
 
 
 def _search_plane(N: sp.csr_matrix, d: Floats, scale: Floats, diagonal: Floats) -> _Plane:

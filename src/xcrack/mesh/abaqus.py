@@ -856,11 +856,12 @@ def abaqus_text(mesh: Mesh) -> str:
             )
     numbers = {name: mesh.facet_numbers(facets) for name, facets in facet_sets.items()}
     rows = np.unique(np.concatenate([np.zeros(0, np.int64), *numbers.values()]))
-    third = ", 0." * (3 - mesh.dim)
+    third_coordinate = ", 0." * (3 - mesh.dim)
     facet_type, cell_type = _WRITTEN_TYPES[mesh.dim]
     lines = ["*HEADING", "mesh written by xcrack", "*NODE"]
     lines += [
-        f"{i}, {', '.join(map(repr, x))}{third}" for i, x in enumerate(mesh.points.tolist(), 1)
+        f"{i}, {', '.join(map(repr, x))}{third_coordinate}"
+        for i, x in enumerate(mesh.points.tolist(), 1)
     ]
     if len(rows):
         lines += [f"*ELEMENT, TYPE={facet_type}", *_rows(mesh.facets[rows], 1)]

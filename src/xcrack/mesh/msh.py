@@ -84,8 +84,8 @@ def _names(names: list[tuple[int, int, str]]) -> Iterable[str]:
 
 def _coordinates(mesh: Mesh) -> list[str]:
     # repr is the shortest text that gives the same number again.
-    third = " 0" * (3 - mesh.dim)
-    return [" ".join(map(repr, x)) + third for x in mesh.points.tolist()]
+    third_coordinate = " 0" * (3 - mesh.dim)
+    return [" ".join(map(repr, x)) + third_coordinate for x in mesh.points.tolist()]
 
 
 def _version_4(mesh: Mesh, entities: list[Entity]) -> Iterable[str]:

@@ -598,10 +598,10 @@ class _Hydrostatic:
 
     p: float
     surface: float
-    deepest: float
+    floor: float
 
     def __call__(self, x: Floats) -> Floats:
-        share = (self.surface - x[:, -1]) / (self.surface - self.deepest)
+        share = (self.surface - x[:, -1]) / (self.surface - self.floor)
         return self.p * np.maximum(share, 0.0)
 
 

@@ -46,7 +46,7 @@ class DeckMaterial:
 
     name: str
     place: str
-    elastic: Floats
+    elastic_rows: Floats
     expansion: Floats
     zero: float
     density: float
@@ -76,13 +76,13 @@ class DeckMaterial:
         ProblemError
             It has none.
         """
-        if not len(self.elastic):
+        if not len(self.elastic_rows):
             raise ProblemError(
                 f"{self.place}: *MATERIAL {self.name!r} has no *ELASTIC: give E and nu."
             )
-        E, nu, at = self.elastic[np.argsort(self.elastic[:, 2])].T
+        E, nu, at = self.elastic_rows[np.argsort(self.elastic_rows[:, 2])].T
         is_variable = np.ptp(T) > _EQUAL * max(float(np.abs(T).max()), 1.0)
-        if not callable(alpha) and not (len(self.elastic) > 1 and is_variable):
+        if not callable(alpha) and not (len(self.elastic_rows) > 1 and is_variable):
             E_of_body, nu_of_body = (float(np.interp(T[0], at, v)) for v in (E, nu))
             return Isotropic(E_of_body, nu_of_body, plane, self.yield_stress, alpha=alpha)
         low, high = np.interp([T.min(), T.max()], at, nu)

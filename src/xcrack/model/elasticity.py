@@ -115,9 +115,9 @@ class Elasticity:
 
     def yield_of_cells(self, cells: Ints) -> Floats:
         """Yield stress in cells `(k,)`, inf where it is not known."""
-        yields = [np.inf if m.yield_stress is None else m.yield_stress for _, m in self.named]
+        limits = [np.inf if m.yield_stress is None else m.yield_stress for _, m in self.named]
         number = self.set_number[cells] if len(self.set_number) else np.zeros_like(cells)
-        return np.asarray(np.array(yields)[number])
+        return np.asarray(np.array(limits)[number])
 
     @cached_property
     def interfaces(self) -> Ints:

@@ -29,7 +29,7 @@ class CurvedSides:
 
     curves: tuple[Curve, ...]
     facet_to_curve: Ints
-    off: float
+    gap: float
 
     @classmethod
     def of(cls, mesh: Mesh) -> "CurvedSides | None":
@@ -169,7 +169,7 @@ class CurvedSides:
                 middle = (x[:, i] + x[:, j]) / 2
                 offset = np.linalg.norm(self.nearest(middle, facet) - middle, axis=1)
                 height = np.maximum(height, offset)
-        halvings = np.clip(np.ceil(np.log2(np.maximum(height / self.off, 1.0)) / 2), 0, None)
+        halvings = np.clip(np.ceil(np.log2(np.maximum(height / self.gap, 1.0)) / 2), 0, None)
         parts = np.minimum(2 ** halvings.astype(np.int64), _MOST_PARTS)
         for n in np.unique(parts):
             yield int(n), np.nonzero(parts == n)[0]

@@ -175,7 +175,7 @@ def resume(
         header = replace(header, ended="")
         run_folder.write_header(folder, header)
         steps = steps_to_go_on_from(run, stored_steps.steps)
-        collection.taken.extend(steps)
+        collection.steps_taken.extend(steps)
         collection.store = RunStore(folder, check, header)
         if run.tolerance is not None and stored_steps.steps:
             collection.mesh = run_folder.read_mesh_file(folder / run_folder.MESH) or problem.mesh
@@ -239,7 +239,7 @@ class Collector:
     keep_solutions: bool
     mesh: Mesh | None = None
     store: RunStore | None = None
-    taken: list[Step] = field(default_factory=list)
+    steps_taken: list[Step] = field(default_factory=list)
 
     def of(self, steps: Iterable[Step]) -> History:
         """Take all steps of an iterable; Ctrl-C and errors lose none of those taken."""
@@ -265,12 +265,14 @@ class Collector:
                 self._attach(error)
                 raise
         if end.startswith("interrupted"):
-            warn(f"growth was {end}: {len(self.taken)} finished steps are handed back.")
+            warn(f"growth was {end}: {len(self.steps_taken)} finished steps are handed back.")
         return history
 
     def _take(self, steps: Iterable[Step]) -> str:
         """Take steps, and return why they ended."""
-        if self.taken and self._is_enough(self.taken[-1]):  # killed before it could write so
+        if self.steps_taken and self._is_enough(
+            self.steps_taken[-1]
+        ):  # killed before it could write so
             return self._stop()
         iterator = iter(steps)
         while True:
@@ -284,7 +286,7 @@ class Collector:
                 )
             if step.solutions:
                 self.mesh = step.solutions[0].problem.mesh
-            self.taken.append(step if self.keep_solutions else replace(step, solutions=()))
+            self.steps_taken.append(step if self.keep_solutions else replace(step, solutions=()))
             if self.store is not None:
                 self.store.write(step)
             if self._is_enough(step):
@@ -313,29 +315,29 @@ class Collector:
         return on >= set(names)
 
     def _interrupt(self) -> str:
-        if not self.taken:
+        if not self.steps_taken:
             raise KeyboardInterrupt
-        return f"interrupted after step {self.taken[-1].index}"
+        return f"interrupted after step {self.steps_taken[-1].index}"
 
     def _stop(self) -> str:
         if callable(self.until):
-            return f"until was true at step {self.taken[-1].index}"
+            return f"until was true at step {self.steps_taken[-1].index}"
         names = ", ".join(names_of_sets(self.until, "collect: until"))
-        return f"cracks are on {names} at step {self.taken[-1].index}"
+        return f"cracks are on {names} at step {self.steps_taken[-1].index}"
 
     def _attach(self, error: Exception) -> None:
         """Hand the finished steps over with an error."""
-        if not self.taken:
+        if not self.steps_taken:
             return
         error.history = self._history(f"an error: {error}")  # type: ignore[attr-defined]
         error.add_note(
-            f"{len(self.taken)} finished steps are in the attribute `history` of this error"
+            f"{len(self.steps_taken)} finished steps are in the attribute `history` of this error"
             + ("." if self.store is None else f", and in {self.store.folder}: see resume.")
         )
 
     def _history(self, end: str) -> History:
         folder = None if self.store is None else self.store.folder
-        return History(tuple(self.taken), end, folder, self.mesh)
+        return History(tuple(self.steps_taken), end, folder, self.mesh)
 
 
 def _is_interrupt(error: BaseException) -> bool:

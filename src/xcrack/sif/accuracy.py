@@ -120,16 +120,16 @@ def check(
     scales = [scale_of(s, part, tip.radius) for s, part in zip(solutions, parts, strict=True)]
     difference, place = _difference(domain, parts, scales)
     doubts = [difference, _overlap_warning(solutions, domain, parts, scales)]
-    narrow = domain.room < domain.least_room or domain.is_short
+    is_narrow = domain.room < domain.least_room or domain.is_short
     is_clipped = domain.outer_radius < domain.free_radius * (1 - 1e-12)
-    if is_clipped and (narrow or any(doubts)) and disagree():
+    if is_clipped and (is_narrow or any(doubts)) and disagree():
         place = domain.narrow_place
         doubts.insert(0, _clipped_K(domain))
     else:
         doubts = [difference]
-    sharp = _sharp_bend(domain)
-    if sharp and domain.bend_at is not None:
-        doubts, place = [sharp, *doubts], domain.bend_at
+    bend = _sharp_bend(domain)
+    if bend and domain.bend_at is not None:
+        doubts, place = [bend, *doubts], domain.bend_at
     messages = []
     if domain.interface < BESIDE * domain.size and depart():
         messages.append(
@@ -200,12 +200,12 @@ def warn_of_order(solution: Solution, crack: int) -> None:
     x = np.array(solution.lips[crack].x)
     if space.dim < 3 or space.order > 1 or not fronts or not len(x):
         return
-    deep = cells_deep(x, np.concatenate(fronts), space.mesh)
-    if deep < DEEP:
+    depth = cells_deep(x, np.concatenate(fronts), space.mesh)
+    if depth < DEEP:
         warn(
-            f"order 1: crack {crack} is {deep:.2g} cells deep, and K is 1 to 5 % too low below "
+            f"order 1: crack {crack} is {depth:.2g} cells deep, and K is 1 to 5 % too low below "
             f"{DEEP:g}, which two domains do not show. Give order=2 (within 0.5 %), or cells that "
-            f"are {DEEP / max(deep, 1e-3):.2g} times smaller as far as the crack is deep."
+            f"are {DEEP / max(depth, 1e-3):.2g} times smaller as far as the crack is deep."
         )
 
 
@@ -253,10 +253,11 @@ def _overlap_warning(
 ) -> str:
     """K_I below zero in a problem with contact: the mesh does not resolve the contact there."""
     for solution, part, scale in zip(solutions, parts, scales, strict=True):
-        least = float(part.K_I.min())
-        if solution.problem.contact != "off" and least < -domain.differ * scale:
+        smallest_K = float(part.K_I.min())
+        if solution.problem.contact != "off" and smallest_K < -domain.differ * scale:
             return (
-                f"K_I = {least:.3g} means crack faces that overlap where the contact cannot see it"
+                f"K_I = {smallest_K:.3g} means crack faces that overlap where the contact cannot "
+                "see it"
             )
     return ""
 
@@ -290,15 +291,15 @@ def _short_zone(solution: Solution, c: int, domain: Domain, part: SIF, scale: fl
     Irwin, 2000, part 3).
     """
     pressure = pressure_at(part, solution, c)
-    touching = pressure > 0
-    short = is_shallow(part, solution, c, _ZONE * domain.size)
-    if not touching.any() or (touching & ~short).any():
+    is_touching = pressure > 0
+    is_shallow_place = is_shallow(part, solution, c, _ZONE * domain.size)
+    if not is_touching.any() or (is_touching & ~is_shallow_place).any():
         return ""
     K_per_pressure = 2 * np.sqrt(2 * _ZONE * domain.size / np.pi)
     if K_per_pressure * pressure.max() <= domain.differ * scale:
         return ""
     return (
-        f"{domain.at(part.x[np.argmax(touching)])}: the contact zone there is shorter than two "
+        f"{domain.at(part.x[np.argmax(is_touching)])}: the contact zone there is shorter than two "
         f"cells ({_ZONE * domain.size:.4g}): its pressure and its end are not resolved. Refine the "
         "mesh there."
     )

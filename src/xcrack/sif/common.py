@@ -77,8 +77,8 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
     y[:, :d], u[:, :d] = x - x.mean(axis=0), solution.coefficients[near_points]
     square, product = y.T @ y, y.T @ u
     inertia = square.trace() * np.eye(3) - square
-    turning = product - product.T
-    moment = np.array([turning[1, 2], turning[2, 0], turning[0, 1]])
+    spin = product - product.T
+    moment = np.array([spin[1, 2], spin[2, 0], spin[0, 1]])
     w = np.linalg.solve(inertia, moment)
     return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])[:d, :d]
 
@@ -128,9 +128,9 @@ def lip_pressure(solution: Solution, c: int) -> Floats:
     lips, contact = solution.lips[c], solution.contact[c]
     total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
     for load, factor in solution.acting:
-        given = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
-        if given is not None:
-            total = total + factor * given
+        pressure = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
+        if pressure is not None:
+            total = total + factor * pressure
     return total
 
 
@@ -198,14 +198,14 @@ def with_closed(sif: SIF, solution: Solution, c: int, size: float) -> SIF:
     """
     if solution.contact[c] is None:
         return sif
-    closed = _without_gaps(is_pressed(sif, solution, c), sif, size) | (sif.K_I < 0)
+    is_closed = _without_gaps(is_pressed(sif, solution, c), sif, size) | (sif.K_I < 0)
     K, spread = np.array(sif.K), np.array(sif.spread)
-    spread[closed, 0] = np.abs(K[closed, 0])
-    K[closed, 0] = 0.0
+    spread[is_closed, 0] = np.abs(K[is_closed, 0])
+    K[is_closed, 0] = 0.0
     at_rest = _at_rest(sif, solution, c, size)
     spread[at_rest] = np.maximum(spread[at_rest], np.abs(K[at_rest]))
     K[at_rest] = 0.0
-    return sound_copy(sif, K=K, spread=spread, closed=closed)
+    return sound_copy(sif, K=K, spread=spread, closed=is_closed)
 
 
 _REST = 1e-6  # slip over the largest displacement that is what solvers leave
@@ -220,27 +220,27 @@ def _at_rest(sif: SIF, solution: Solution, c: int, size: float) -> Bools:
         return np.zeros(len(sif.x), dtype=bool)
     slip = np.abs(contact.slip).reshape(len(contact.points), -1).max(axis=1)
     largest = np.abs(solution.u).max(initial=0.0)
-    rests = np.asarray(contact.stuck) & (slip <= _REST * largest)
+    is_at_rest = np.asarray(contact.stuck) & (slip <= _REST * largest)
     tree = cKDTree(contact.points)
-    around, nearest = tree.query_ball_point(sif.x, size), tree.query(sif.x)[1]
-    rows = [near or [first] for near, first in zip(around, nearest, strict=True)]
-    return np.array([rests[near].all() for near in rows], dtype=bool)
+    neighbours, nearest = tree.query_ball_point(sif.x, size), tree.query(sif.x)[1]
+    rows = [rows_nearby or [first] for rows_nearby, first in zip(neighbours, nearest, strict=True)]
+    return np.array([is_at_rest[rows_of_place].all() for rows_of_place in rows], dtype=bool)
 
 
-def _without_gaps(closed: Bools, sif: SIF, size: float) -> Bools:
+def _without_gaps(is_closed: Bools, sif: SIF, size: float) -> Bools:
     """Closed places, and those of a front that have closed ones within a cell on both sides.
 
     On coarse meshes the multipliers of a few places fall open beside a front that is closed.
     """
-    if len(sif.x) == 1 or not closed.any():
-        return closed
-    result = np.array(closed)
-    places = sif.x[closed]
+    if len(sif.x) == 1 or not is_closed.any():
+        return is_closed
+    result = np.array(is_closed)
+    places = sif.x[is_closed]
     tree = cKDTree(places)
-    for row in np.nonzero(~closed)[0]:
+    for row in np.nonzero(~is_closed)[0]:
         offsets = places[tree.query_ball_point(sif.x[row], size)] - sif.x[row]
-        along = offsets @ sif.frame[row, -1]
-        result[row] = bool((along > 0).any() and (along < 0).any())
+        distance_along = offsets @ sif.frame[row, -1]
+        result[row] = bool((distance_along > 0).any() and (distance_along < 0).any())
     return result
 
 
@@ -281,9 +281,9 @@ def is_shallow(sif: SIF, solution: Solution, c: int, depth: float) -> Bools:
         return np.zeros_like(result)
     tree = cKDTree(is_open)
     for row in np.nonzero(result)[0]:
-        back = sif.x[row] - is_open[tree.query_ball_point(sif.x[row], depth)]
-        behind = back @ sif.frame[row, 0] > _STEEPEST * np.linalg.norm(back, axis=1)
-        result[row] = behind.any()
+        way_back = sif.x[row] - is_open[tree.query_ball_point(sif.x[row], depth)]
+        is_behind = way_back @ sif.frame[row, 0] > _STEEPEST * np.linalg.norm(way_back, axis=1)
+        result[row] = is_behind.any()
     return result
 
 

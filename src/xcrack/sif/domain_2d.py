@@ -52,10 +52,10 @@ class RingPart:
     plain_cells: Ints
     degree: int
     other_points: Iterable[Tabulated]
-    differs: bool
+    has_other_material: bool
 
 
-def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iterable[RingPart]:
+def ring_parts(solution: Solution, t: int, inner_radius: float, outer: float) -> Iterable[RingPart]:
     """Cells around tip t by class, with points and functions where functions are enriched.
 
     Where the solve keeps its factor for estimates, these points stay with it too: K and the
@@ -66,26 +66,28 @@ def ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Itera
     solution : Solution
     t : int
         Number of the tip in `space.tips`.
-    hollow, outer : float, length
+    inner_radius, outer : float, length
         Radii between which the cells lie.
     """
-    parts, factored = _ring_parts(solution, t, hollow, outer), solution.factored
+    parts, factored = _ring_parts(solution, t, inner_radius, outer), solution.factored
     if factored is None:
         return parts
-    key = t, hollow, outer
-    stored: Iterable[RingPart] | None = factored.around_tips.get(key)
-    if stored is None:
-        stored = tuple(parts)
+    key = t, inner_radius, outer
+    parts_in_store: Iterable[RingPart] | None = factored.around_tips.get(key)
+    if parts_in_store is None:
+        parts_in_store = tuple(parts)
         # More than one chunk of cells is too much to be stored.
-        if all(isinstance(part.other_points, tuple) for part in stored):
-            factored.around_tips[key] = stored
-    return stored
+        if all(isinstance(part.other_points, tuple) for part in parts_in_store):
+            factored.around_tips[key] = parts_in_store
+    return parts_in_store
 
 
-def _ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iterator[RingPart]:
+def _ring_parts(
+    solution: Solution, t: int, inner_radius: float, outer: float
+) -> Iterator[RingPart]:
     space, elasticity = solution.space, solution.problem.elasticity
     x = space.tips[t].x
-    for cells, n, degree in ring_classes(space, x, hollow, outer):
+    for cells, n, degree in ring_classes(space, x, inner_radius, outer):
         if not elasticity.is_uniform:
             cells = np.setdiff1d(
                 cells, elasticity.cells_unlike(material_at_tip(solution, t), cells)
@@ -98,22 +100,28 @@ def _ring_parts(solution: Solution, t: int, hollow: float, outer: float) -> Iter
         yield _ring_part(space, cells, n, degree, True)
 
 
-def _ring_part(space: FunctionSpace, cells: Ints, n: int, degree: int, differs: bool) -> RingPart:
-    plain = space.signature[cells] == 0
-    others = cells[~plain]
+def _ring_part(
+    space: FunctionSpace, cells: Ints, n: int, degree: int, has_other_material: bool
+) -> RingPart:
+    is_plain = space.signature[cells] == 0
+    others = cells[~is_plain]
     points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree))
-    few = len(others) <= _CHUNK
-    return RingPart(cells[plain], degree, tuple(points) if few else points, differs)
+    is_one_chunk = len(others) <= _CHUNK
+    return RingPart(
+        cells[is_plain], degree, tuple(points) if is_one_chunk else points, has_other_material
+    )
 
 
 def ring_classes(
-    space: FunctionSpace, centre: Floats, hollow: float, radius: float
+    space: FunctionSpace, centre: Floats, inner_radius: float, radius: float
 ) -> Iterator[tuple[Ints, int, int]]:
     """Cells between two radii by size, points a direction with tip functions, degree without."""
     from xcrack.sif.kernels.ring import cells_between
 
     mesh = space.mesh
-    near_cells = cells_between(mesh.points, mesh.cells, mesh.cell_size, centre, hollow, radius)
+    near_cells = cells_between(
+        mesh.points, mesh.cells, mesh.cell_size, centre, inner_radius, radius
+    )
     # A quarter of the radius is a common size: which class it is in is not left to round-off.
     share = mesh.cell_size[near_cells] / radius * (1 - 1e-9)
     for low, high, n, degree in _DEGREES:
@@ -190,9 +198,9 @@ def _largest_difference(
             K = np.abs(part.K[0])
             scale = max(scale, scale_of(solution, part, solution.space.tips[t].radius))
             at_lips = np.abs(_K_of_lips(solution, t, jump, domain.size))
-            away = np.abs(at_lips - K)
-            away[0] = 0.0 if part.closed[0] else away[0]  # K_I is exact there
-            difference = max(difference, float(away.max()))
+            deviation = np.abs(at_lips - K)
+            deviation[0] = 0.0 if part.closed[0] else deviation[0]  # K_I is exact there
+            difference = max(difference, float(deviation.max()))
         worst = max(worst, difference / scale if scale > 0 else 0.0)
     return worst
 
@@ -205,12 +213,12 @@ def _K_of_lips(solution: Solution, t: int, jump: Floats, size: float) -> Floats:
     tip = solution.space.tips[t]
     lips = solution.lips[tip.crack]
     r = np.linalg.norm(lips.x - tip.x, axis=1)
-    near = (r > 0) & (r < _LIPS * size)
-    if near.sum() < 3:
+    is_near = (r > 0) & (r < _LIPS * size)
+    if is_near.sum() < 3:
         return np.full(2, np.inf)
-    r, weight = r[near], np.sqrt(lips.weight[near])[:, None]
+    r, weight = r[is_near], np.sqrt(lips.weight[is_near])[:, None]
     E_prime = material_at_tip(solution, t).E_prime
-    values = 0.125 * E_prime * np.sqrt(2 * np.pi) * jump[near] @ tip.frame[[1, 0]].T
+    values = 0.125 * E_prime * np.sqrt(2 * np.pi) * jump[is_near] @ tip.frame[[1, 0]].T
     columns = np.stack([np.sqrt(r), r**1.5 / size], axis=1)
     return np.asarray(np.linalg.lstsq(columns * weight, values * weight, rcond=None)[0][0])
 
@@ -267,11 +275,11 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     outer = float(radii.max())
     total = lip_terms(solutions, ring)
     # Within the inner radius grad q vanishes.
-    hollow = float(ring.inner.min())
-    for part in ring_parts(solutions[0], t, hollow, outer):
+    inner_radius = float(ring.inner.min())
+    for part in ring_parts(solutions[0], t, inner_radius, outer):
         total += plain_terms(solutions, ring, part)
         for values in part.other_points:
-            total += point_terms(solutions, ring, values, part.differs)
+            total += point_terms(solutions, ring, values, part.has_other_material)
     if has_effect(solutions, "volume", "initial_stress"):
         for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
             for points in class_points(space, cells, n, degree):
@@ -293,7 +301,7 @@ def domain_of(solution: Solution, t: int) -> Domain:
     cells = space.cuts[tip.crack].level_set.tip_cells[tip.number]
     size = float(space.mesh.cell_size[cells].mean())
     radius = solution.problem.numerics.domain or max(_OUTER[space.order] * tip.radius, 4.0 * size)
-    free, _ = nearest_boundary(space.mesh, tip.x)
+    free_distance, _ = nearest_boundary(space.mesh, tip.x)
     radii_of_tip: list[float] = []
     others: list[float] = []
     for other in space.tips:
@@ -305,17 +313,17 @@ def domain_of(solution: Solution, t: int) -> Domain:
         for c, points in enumerate(solution.lips)
         if c != tip.crack and len(points)
     ]
-    room = min([0.95 * free, *[0.8 * d for d in others], *[0.9 * d for d in lips]])
+    room = min([0.95 * free_distance, *[0.8 * d for d in others], *[0.9 * d for d in lips]])
     limit = min([room, *[0.8 * d for d in radii_of_tip]])
-    shortest = _SHORT_OPEN if radii_of_tip else 0.0
+    least_length = _SHORT_OPEN if radii_of_tip else 0.0
     if solution.contact[tip.crack] is not None:
-        shortest = _SHORT_CONTACT
+        least_length = _SHORT_CONTACT
     return Domain(
         outer_radius=min(radius, max(limit, 1.2 * size)),
         free_radius=radius,
         room=room,
         least_room=_ROOM[space.order] * size,
-        is_short=float(solution.lips[tip.crack].weight.sum()) < shortest * size,
+        is_short=float(solution.lips[tip.crack].weight.sum()) < least_length * size,
         size=size,
         narrow_place=tip.x,
         differ=_DIFFER[space.order],

@@ -33,7 +33,7 @@ from xcrack.sif.interaction_3d import (
     domain_integrals,
     front_nodes,
     lip_integrals,
-    means,
+    mean_integrals,
     reading,
     solve_front,
     twice_as_wide,
@@ -122,27 +122,27 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     space = solutions[0].space
     tip = space.tips[t]
     number = space.cracks[tip.crack].fronts or ()
-    closed = bool(number[tip.number][0] == number[tip.number][-1])
-    whole = front_curve(tip.x, tip.frame, closed)
+    is_closed = bool(number[tip.number][0] == number[tip.number][-1])
+    whole_curve = front_curve(tip.x, tip.frame, is_closed)
     is_inside = partial(inside_body, space.cracks, tip.crack, space.mesh)
-    inside = np.nonzero(is_inside(np.array(tip.x)))[0]
-    first, last = (0, len(tip.x)) if closed else part_inside(tip.x, inside, is_inside)
-    curve = front_curve(tip.x[first:last], tip.frame[first:last], closed)
+    rows_inside = np.nonzero(is_inside(np.array(tip.x)))[0]
+    first, last = (0, len(tip.x)) if is_closed else part_inside(tip.x, rows_inside, is_inside)
+    curve = front_curve(tip.x[first:last], tip.frame[first:last], is_closed)
     curve = replace(curve, is_cut=_cut_ends(solutions[0], t, curve))
-    s = curve.breaks[inside - first]
+    s = curve.breaks[rows_inside - first]
     x, frame, _ = curve.at(s)
     ends = way_inside(curve, is_inside)
     nothing = np.zeros(len(s))
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     materials = front_materials(solutions[0], t, curve, size)
     E_prime, nu = materials.moduli(s)
-    empty = SIF(
-        x=np.array(tip.x)[inside],
+    empty_sif = SIF(
+        x=np.array(tip.x)[rows_inside],
         frame=frame,
         K=np.zeros((len(s), 3)),
         T=nothing + np.nan,
         spread=np.zeros((len(s), 3)),
-        s=whole.arc(whole.breaks[inside]),
+        s=whole_curve.arc(whole_curve.breaks[rows_inside]),
         front=np.zeros(len(s), dtype=np.int64),
         at_surface=np.ones(len(s), dtype=bool),
         closed=np.zeros(len(s), dtype=bool),
@@ -152,46 +152,46 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         nu=nu,
     )
     if ends is None or not len(s):
-        return [empty] * len(solutions)
+        return [empty_sif] * len(solutions)
     values = front_values(solutions, t, curve, ends, materials)
     if not values.is_known.any():
         _warn_unknown(x, values)
-        return [empty] * len(solutions)
+        return [empty_sif] * len(solutions)
     depth = _depth(solutions[0], curve, ends)
-    free = _free_ends(curve, values)
+    is_free = _free_ends(curve, values)
     read = np.clip(
-        s, ends[0] + depth if free[0] else -np.inf, ends[1] - depth if free[1] else np.inf
+        s, ends[0] + depth if is_free[0] else -np.inf, ends[1] - depth if is_free[1] else np.inf
     )
     read, passes = materials.beside_changes(read, values.domain.size)
-    everywhere = np.append(read, (ends[0] + depth, ends[1] - depth))
-    matrix = reading(values.knots, values.is_known, curve, everywhere)
+    all_places = np.append(read, (ends[0] + depth, ends[1] - depth))
+    matrix = reading(values.knots, values.is_known, curve, all_places)
     K = np.einsum("sv,nkvm->nksm", matrix, values.K[:, :, values.is_known])
-    wide = np.einsum("sv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
+    K_of_wide = np.einsum("sv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
     if not materials.is_one:
-        of_material = materials.factors(everywhere)
-        K, wide = K * of_material, wide * of_material
+        of_material = materials.factors(all_places)
+        K, K_of_wide = K * of_material, K_of_wide * of_material
         values = replace(values, mean_K=values.mean_K * materials.factors(values.knots))
-    period = curve.length if closed else None
+    period = curve.length if is_closed else None
     cells = np.interp(s, values.knots, values.radius, period=period) / values.domain.size
     at_surface = (read != s) | ~_covered_parameters(curve, values.knots, values.is_known, s)
     result = []
     for n, solution in enumerate(solutions):
         rows = K[n, :, : len(s)]
         sif = replace(
-            empty,
+            empty_sif,
             K=rows[0],
             spread=np.abs(rows[0] - rows[1]),
-            widened=np.abs(rows[0] - wide[n, : len(s)]),
+            widened=np.abs(rows[0] - K_of_wide[n, : len(s)]),
             at_surface=at_surface,
             domain_cells=cells,
         )
         sif = with_closed(sif, solution, tip.crack, values.domain.size)
-        known = tuple(
+        surface_ends = tuple(
             _surface_end(curve, ends[e], K[n, 0, len(s) + e], values, n, -e, depth, sif)
             for e in (0, 1)
-            if free[e]
+            if is_free[e]
         )
-        result.append(replace(sif, ends=known))
+        result.append(replace(sif, ends=surface_ends))
     for message in check(solutions, t, values.domain, result):
         warn(message)
     warn_of_changes(materials, curve, passes)
@@ -214,20 +214,20 @@ def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool
     ]
     result = []
     for e, sign in ((0, -1.0), (1, 1.0)):
-        beyond = np.concatenate([*others, x[[1 - e]]]) - x[e]
-        away = np.linalg.norm(beyond, axis=1)
-        ahead = sign * (beyond @ frame[e, 2])
-        close = (away < _BESIDE * radius) & (ahead >= _AHEAD * away)
-        result.append(bool(close.any()))
+        ways = np.concatenate([*others, x[[1 - e]]]) - x[e]
+        distance = np.linalg.norm(ways, axis=1)
+        distance_ahead = sign * (ways @ frame[e, 2])
+        is_close = (distance < _BESIDE * radius) & (distance_ahead >= _AHEAD * distance)
+        result.append(bool(is_close.any()))
     return result[0], result[1]
 
 
 def _wanted_radius(solution: Solution, t: int) -> float:
     """Outer radius of the domains along a front where nothing limits it, length."""
     tip, space = solution.space.tips[t], solution.space
-    given = solution.problem.numerics.domain
-    if given is not None:
-        return given
+    given_radius = solution.problem.numerics.domain
+    if given_radius is not None:
+        return given_radius
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     return max(_OUTER * size, _REACH * tip.radius)
 
@@ -248,16 +248,16 @@ def _surface_end(
 def _depth(solution: Solution, curve: FrontCurve, ends: tuple[float, float]) -> float:
     """Depth below a free surface at which K is read, length along the front."""
     length = ends[1] - ends[0]
-    given = solution.problem.numerics.depth
-    return min(_DEPTH * length if given is None else given, length / 2)
+    given_depth = solution.problem.numerics.depth
+    return min(_DEPTH * length if given_depth is None else given_depth, length / 2)
 
 
 def _free_ends(curve: FrontCurve, values: FrontValues) -> tuple[bool, bool]:
     """Whether a front has a first and a last end at a surface whose tractions are known."""
     if curve.closed:
         return False, False
-    known = values.is_known & ~values.is_smooth
-    return bool(known[0]), bool(known[-1])
+    is_known = values.is_known & ~values.is_smooth
+    return bool(is_known[0]), bool(is_known[-1])
 
 
 def way_inside(
@@ -267,20 +267,20 @@ def way_inside(
     if curve.closed:
         return 0.0, curve.length
     s = np.linspace(0.0, curve.length, _SAMPLES + 1)
-    inside = np.nonzero(is_inside(curve.at(s)[0]))[0]
-    if not len(inside):
+    rows_inside = np.nonzero(is_inside(curve.at(s)[0]))[0]
+    if not len(rows_inside):
         return None
     ends = []
-    for last, step in ((int(inside[0]), -1), (int(inside[-1]), 1)):
-        within = s[last]
-        outside = s[min(max(last + step, 0), _SAMPLES)]
-        for _ in range(30 if outside != within else 0):
-            middle = (within + outside) / 2
+    for last, step in ((int(rows_inside[0]), -1), (int(rows_inside[-1]), 1)):
+        s_inside = s[last]
+        s_outside = s[min(max(last + step, 0), _SAMPLES)]
+        for _ in range(30 if s_outside != s_inside else 0):
+            middle = (s_inside + s_outside) / 2
             if is_inside(curve.at(np.array([middle]))[0])[0]:
-                within = middle
+                s_inside = middle
             else:
-                outside = middle
-        ends.append(float(within))
+                s_outside = middle
+        ends.append(float(s_inside))
     return ends[0], ends[1]
 
 
@@ -292,14 +292,14 @@ def _warn_unknown(x: Floats, values: FrontValues) -> None:
     )
 
 
-def _covered_parameters(curve: FrontCurve, knots: Floats, valid: Bools, s: Floats) -> Bools:
+def _covered_parameters(curve: FrontCurve, knots: Floats, is_valid: Bools, s: Floats) -> Bools:
     """Which parameters lie at or between valid tops of hats; ends of open fronts with them."""
-    on = (np.abs(s[:, None] - knots[valid]) <= _ON * curve.length).any(axis=1)
+    on = (np.abs(s[:, None] - knots[is_valid]) <= _ON * curve.length).any(axis=1)
     if curve.closed:
-        left = np.mod(np.searchsorted(knots, s * (1 + 1e-12), side="right") - 1, len(knots))
-        return np.asarray(on | (valid[left] & valid[(left + 1) % len(knots)]))
-    left = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
-    return np.asarray(on | (valid[left] & valid[left + 1]))
+        left_knot = np.mod(np.searchsorted(knots, s * (1 + 1e-12), side="right") - 1, len(knots))
+        return np.asarray(on | (is_valid[left_knot] & is_valid[(left_knot + 1) % len(knots)]))
+    left_knot = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
+    return np.asarray(on | (is_valid[left_knot] & is_valid[left_knot + 1]))
 
 
 def front_values(
@@ -328,12 +328,14 @@ def front_values(
     knots = front_nodes(curve, _spacing(curve, ends, size), ends)
     sides = sides_around(solutions, tip.crack, curve, target_radius)
     room = _room(solutions[0], t, curve, knots, size)
-    beside = np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
-    smooth = np.zeros(len(knots), dtype=bool)
+    room_at_sides = (
+        np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
+    )
+    is_smooth = np.zeros(len(knots), dtype=bool)
     if sides is not None:
-        smooth = on_smooth_planes(sides, curve, knots)
-    valid = beside > _LEAST * size
-    room = np.where(valid, np.minimum(room, beside), room)
+        is_smooth = on_smooth_planes(sides, curve, knots)
+    is_valid = room_at_sides > _LEAST * size
+    room = np.where(is_valid, np.minimum(room, room_at_sides), room)
     radius = np.clip(room, _LEAST * size, target_radius)
     radii = radius[:, None] * np.array([1.0, SECOND])
     outer = float(radius.max())
@@ -344,20 +346,20 @@ def front_values(
         total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn, materials)
     for part in _domain_parts(solutions, t, curve, knots, radii, turn, materials):
         total += part
-    K = solve_front(total, knots, curve, tip_material, valid, smooth)
-    wide = twice_as_wide(total, knots, curve, tip_material, valid, smooth)
-    mean = means(total[:, 0], knots, curve, tip_material)
-    least = int(np.argmin(room))
+    K = solve_front(total, knots, curve, tip_material, is_valid, is_smooth)
+    wide_K = twice_as_wide(total, knots, curve, tip_material, is_valid, is_smooth)
+    mean = mean_integrals(total[:, 0], knots, curve, tip_material)
+    least_row = int(np.argmin(room))
     bend = curve.bend(knots, _BEND_OVER * size)
     bend_at = int(np.argmin(bend))
     domain = Domain(
         outer_radius=float(radius.min()),
         free_radius=target_radius,
-        room=float(room[least]),
+        room=float(room[least_row]),
         least_room=_NARROW * size,
         is_short=False,
         size=size,
-        narrow_place=curve.at(knots[[least]])[0][0],
+        narrow_place=curve.at(knots[[least_row]])[0][0],
         differ=_DIFFER,
         label="K along the front, at",
         bend=float(bend[bend_at]),
@@ -366,7 +368,7 @@ def front_values(
             solutions[0], curve.at(knots[~materials.beside_changes(knots, 1.5 * size)[1]])[0]
         ),
     )
-    return FrontValues(knots, K, mean, valid, wide, smooth, radius, domain)
+    return FrontValues(knots, K, mean, is_valid, wide_K, is_smooth, radius, domain)
 
 
 def _distance_to_interface(solution: Solution, x: Floats) -> float:
@@ -407,12 +409,12 @@ def _room(solution: Solution, t: int, curve: FrontCurve, knots: Floats, size: fl
     x = curve.at(s.ravel())[0]
     room = _BENT * curve.bend(s.ravel(), size)
     cracks = solution.space.cracks
-    under = [on for on, _ in cracks[tip.crack].ends_on]  # their faces bound the domains
+    cracks_under = [on for on, _ in cracks[tip.crack].ends_on]  # their faces bound the domains
     for other in solution.space.tips:
         if other is not tip and not are_opposite(cracks[other.crack], cracks[tip.crack]):
             room = np.minimum(room, 0.8 * cKDTree(other.x).query(x)[0])
     for c, lips in enumerate(solution.lips):
-        if c == tip.crack or c in under or are_opposite(cracks[c], cracks[tip.crack]):
+        if c == tip.crack or c in cracks_under or are_opposite(cracks[c], cracks[tip.crack]):
             continue
         if len(lips):
             room = np.minimum(room, 0.9 * cKDTree(lips.x).query(x)[0])
@@ -434,7 +436,7 @@ def _domain_parts(
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-    initial, elasticity = initial_stresses(solutions), solutions[0].problem.elasticity
+    initial_stress, elasticity = initial_stresses(solutions), solutions[0].problem.elasticity
     middle = mesh.points[mesh.cells].mean(axis=1)
     reach = 1.05 * outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
@@ -445,7 +447,7 @@ def _domain_parts(
     def part(first: int) -> Floats | None:
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE, True)
         x = position(space, points.cell, points.bary)
-        near_points, feet = curve.near(x, outer)
+        near_points, feet = curve.points_near(x, outer)
         if not len(near_points):
             return None
         counts = before_junctions(space, tip.crack, points.side[near_points])
@@ -453,21 +455,22 @@ def _domain_parts(
             near_points, feet = near_points[counts], feet.chosen(counts)
         points = points.chosen(near_points)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
-        behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
+        is_behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
         force, side = _force(solutions, x[near_points]), points.side[:, tip.crack]
         if materials.is_one:
             material, change = materials.references[0], None
             if not elasticity.is_uniform:
                 change = elasticity.stress_change(material, gradient, points.cell, points.bary)
             return domain_integrals(
-                curve, knots, feet, points.weight, gradient - turn, side, behind, material, radii,
-                force=force, initial=initial, stress_change=change,
+                curve, knots, feet, points.weight, gradient - turn, side, is_behind, material,
+                radii,
+                force=force, initial_stress=initial_stress, stress_change=change,
             )  # fmt: skip
         total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
         for material, rows, ratio in materials.parts(feet.s):
             local_gradient, of_feet = gradient[rows], feet.chosen(rows)
             cell, bary = points.cell[rows], points.bary[rows]
-            change, rise, turned = (
+            change, rise, no_turn = (
                 elasticity.stress_change(material, local_gradient, cell, bary),
                 None,
                 turn,
@@ -475,11 +478,12 @@ def _domain_parts(
             if ratio is not None:
                 change -= (ratio[0] - 1)[:, None, None, None] * _stresses(material, local_gradient)
                 local_gradient = ratio[0][:, None, None, None] * (local_gradient - turn)
-                rise, turned = ratio[1] / of_feet.turn[:, 3], np.zeros_like(turn)
+                rise, no_turn = ratio[1] / of_feet.turn[:, 3], np.zeros_like(turn)
             total += domain_integrals(
-                curve, knots, of_feet, points.weight[rows], local_gradient - turned, side[rows],
-                behind[rows],
-                material, radii, force=None if force is None else force[rows], initial=initial,
+                curve, knots, of_feet, points.weight[rows], local_gradient - no_turn, side[rows],
+                is_behind[rows],
+                material, radii, force=None if force is None else force[rows],
+                initial_stress=initial_stress,
                 stress_change=change, rise=rise,
             )  # fmt: skip
         return total
@@ -522,20 +526,20 @@ def _lip_part(
     space = solutions[0].space
     c = space.tips[t].crack
     lips, outer = solutions[0].lips[c], float(radii.max())
-    near_points, feet = curve.near(lips.x, outer)
+    near_points, feet = curve.points_near(lips.x, outer)
     feet = _as_seen(solutions[0], t, near_points, feet)
     pressure = np.stack([lip_pressure(solution, c)[near_points] for solution in solutions], axis=-1)
-    inside = feet.r < outer
-    height = np.abs(feet.local[inside, 1]).max(initial=0.0)
-    bent = height > 1e-9 * outer
+    is_inside = feet.r < outer
+    height = np.abs(feet.local[is_inside, 1]).max(initial=0.0)
+    is_bent = height > 1e-9 * outer
     traction = lips.normal[near_points][:, :, None] * pressure[:, None]
     for k, shear in enumerate(lip_shear(solution, c) for solution in solutions):
         if shear is not None:
             traction[:, :, k] += shear[near_points]
-    if not bent and not traction.any():
+    if not is_bent and not traction.any():
         return np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     gradient = None
-    if bent:
+    if is_bent:
         coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
         both = [
             gradients_at(space, coefficients, *_on_lip(solutions[0], c, near_points, s, sign))
@@ -545,14 +549,14 @@ def _lip_part(
         gradient = np.stack(both)
     normal, weight = lips.normal[near_points], lips.weight[near_points]
     total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
-    initial = initial_stresses(solutions)
+    initial_stress = initial_stresses(solutions)
     for material, rows, ratio in materials.parts(feet.s):
         local_gradient = None if gradient is None else gradient[:, rows]
         if local_gradient is not None and ratio is not None:
             local_gradient = local_gradient * ratio[0][None, :, None, None, None]
         total += lip_integrals(
             curve, knots, feet.chosen(rows), normal[rows], weight[rows], traction[rows], material,
-            radii, gradient=local_gradient, initial=initial,
+            radii, gradient=local_gradient, initial_stress=initial_stress,
         )  # fmt: skip
     return total
 
@@ -568,11 +572,11 @@ def _as_seen(solution: Solution, t: int, rows: Ints, feet: FootPoints) -> FootPo
     lips = solution.lips[tip.crack]
     corner = space.mesh.cells[lips.cell[rows, 1]]
     psi = space.cuts[tip.crack].level_set.psi[tip.number][corner]
-    ahead = np.einsum("qb,qb->q", lips.bary[rows, 1], psi)
+    psi_of_lips = np.einsum("qb,qb->q", lips.bary[rows, 1], psi)
     local = np.array(feet.local)
     # Out of reach of the tube psi has only a sign.
-    is_within = np.abs(ahead - local[:, 0]) < tip.radius
-    local[is_within, 0] = ahead[is_within]
+    is_within = np.abs(psi_of_lips - local[:, 0]) < tip.radius
+    local[is_within, 0] = psi_of_lips[is_within]
     return replace(feet, local=local)
 
 

@@ -147,8 +147,8 @@ def _interface_ends(solution: Solution, crack: int) -> Floats:
     mesh, lips = solution.problem.mesh, solution.lips[crack]
     nodes = np.intersect1d(mesh.facets[elasticity.interfaces], mesh.boundary)
     order = np.argsort(lips.s, kind="stable")
-    crosses = (np.diff(elasticity.number[lips.cell[order]], axis=0) != 0).any(axis=1)
-    return np.concatenate([mesh.points[nodes], lips.x[order[1:][crosses]]])
+    is_crossing = (np.diff(elasticity.number[lips.cell[order]], axis=0) != 0).any(axis=1)
+    return np.concatenate([mesh.points[nodes], lips.x[order[1:][is_crossing]]])
 
 
 def _contributions_near(solution: Solution, result: Estimate, x: Floats) -> Floats:
@@ -247,8 +247,8 @@ def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     crack : int
     """
     bars = bars_and_shares(solutions, sifs, crack)[0]
-    common = _refusal_of_short_parts(solutions[0], crack)
-    reasons = [common or _refusal_at_kinks(s, crack) for s in solutions]
+    common_reason = _refusal_of_short_parts(solutions[0], crack)
+    reasons = [common_reason or _refusal_at_kinks(s, crack) for s in solutions]
     every = zip(bars, reasons, strict=True)
     return [_without_estimate(one, reason) if reason else one for one, reason in every]
 
@@ -273,10 +273,10 @@ def bars_and_shares(
         Zero where there are no estimates.
     """
     shape = sifs[0].K.shape
-    general = _refusal_of_solution(solutions[0], crack)
-    if general or not shape[0]:
+    general_reason = _refusal_of_solution(solutions[0], crack)
+    if general_reason or not shape[0]:
         cells = len(solutions[0].problem.mesh.cells)
-        return [no_bars(shape, general)] * len(sifs), np.zeros((len(sifs), *shape, cells))
+        return [no_bars(shape, general_reason)] * len(sifs), np.zeros((len(sifs), *shape, cells))
     errors = tip_errors(solutions, crack)
     tips = solutions[0].space.tips_of(crack)
     domains = [domain_of(solutions[0], t) for t in tips]
@@ -307,11 +307,11 @@ def _refusal_of_solution(solution: Solution, crack: int) -> str:
 
 def _least_at_tip(solution: Solution, crack: int, domain: Domain) -> tuple[float, float, str]:
     """Size of cells from which on bars hold at a tip, that there, and why it is too large."""
-    least = _SHORTEST[len(solution.space.tips_of(crack))]
+    least_cells = _SHORTEST[len(solution.space.tips_of(crack))]
     length, size = float(solution.lips[crack].weight.sum()), domain.size
     what = {
-        length / least: f"the crack is {length / size:.1f} cells long, and bars hold from "
-        f"{least:g} on: refine the mesh there",
+        length / least_cells: f"the crack is {length / size:.1f} cells long, and bars hold from "
+        f"{least_cells:g} on: refine the mesh there",
         domain.interface / BESIDE: f"another material begins {domain.interface / size:.2g} cells "
         f"away, and bars hold from {BESIDE:g} on: refine the mesh there",
         domain.room / _ROOM: f"the next boundary, crack or tip is {domain.room / size:.1f} cells "
@@ -329,14 +329,14 @@ def _bars(
 ) -> KErrors:
     """Bars of one state."""
     places = [_least_at_tip(solution, crack, domain)[2] for domain in domains]
-    estimated = _CAUGHT * errors.eta[k] + (_CAUGHT_AT_CORNERS - _CAUGHT) * errors.corners[k]
-    eta = estimated + errors.bend[k] + errors.rim[k] + errors.gap[k]
-    clipped = _clipping(domains)[:, None] ** 2
+    estimate = _CAUGHT * errors.eta[k] + (_CAUGHT_AT_CORNERS - _CAUGHT) * errors.corners[k]
+    eta = estimate + errors.bend[k] + errors.rim[k] + errors.gap[k]
+    clipping = _clipping(domains)[:, None] ** 2
     on_points = _SPREAD_ON_POINTS * _are_on_points(solution, crack)[:, None]
     contact = np.hypot(_END * errors.end[k], errors.gap_bar[k])
     parts = [
-        _ETA * estimated, _AT_CORNERS * errors.corners[k],
-        _SHARES * errors.shares[k].sum(axis=-1), _SPREAD * clipped * sif.spread,
+        _ETA * estimate, _AT_CORNERS * errors.corners[k],
+        _SHARES * errors.shares[k].sum(axis=-1), _SPREAD * clipping * sif.spread,
         on_points * sif.spread, _AT_KINKS * errors.kinks[k], _AT_INTERFACES * errors.interfaces[k],
         contact, _BEND * errors.bend_bar[k], _RIM * errors.rim[k],
     ]  # fmt: skip
@@ -346,8 +346,8 @@ def _bars(
     bar = np.sqrt(np.sum(np.square(parts), axis=0))
     bar *= _factors_of_interfaces(domains)[:, None]
     radius = np.array([domain.outer_radius for domain in domains])
-    least = _QUADRATURE * np.abs(np.nan_to_num(sif.T)) * np.sqrt(np.pi * radius)
-    bar = np.maximum(bar, least[:, None])
+    least_bar = _QUADRATURE * np.abs(np.nan_to_num(sif.T)) * np.sqrt(np.pi * radius)
+    bar = np.maximum(bar, least_bar[:, None])
     if solution.problem.contact != "off":  # negative K_I: faces overlap where contact is blind
         overlap = np.maximum(np.maximum(-sif.K_I, -sif.K_I - eta[:, 0]), 0.0)
         bar += _OVERLAP * overlap.max()
@@ -459,17 +459,17 @@ def _refusal_of_short_parts(solution: Solution, crack: int) -> str:
 
     What the functions of its few cells cannot show, those of the surplus space cannot either.
     """
-    for x, room, least, size in _short_parts(solution, crack):
-        if room >= least * size:
+    for x, room, least_cells, size in _short_parts(solution, crack):
+        if room >= least_cells * size:
             continue
-        if least == _BRANCH:
+        if least_cells == _BRANCH:
             return (
                 f"the next tip, junction or boundary is {room / size:.1f} cells from the junction "
-                f"at {at(x)}, and bars hold from {least:g} on: refine the mesh there"
+                f"at {at(x)}, and bars hold from {least_cells:g} on: refine the mesh there"
             )
         return (
             f"the boundary is {room / size:.1f} cells from the kink at {at(x)}, and bars hold "
-            f"from {least:g} on: refine the mesh there"
+            f"from {least_cells:g} on: refine the mesh there"
         )
     return ""
 
@@ -485,9 +485,9 @@ def _short_parts(solution: Solution, crack: int) -> list[tuple[Floats, float, fl
         lines = [problem.placed[c] for c in (j.crack, j.on)]
         ends = [line.points[i] for line in lines for i in line.tips or ()]
         others = [k.x for k in junctions if {k.crack, k.on} & {j.crack, j.on}]
-        away = np.linalg.norm(np.array([*ends, *others]) - j.x, axis=1)
+        distance = np.linalg.norm(np.array([*ends, *others]) - j.x, axis=1)
         size = float(cell_sizes(mesh, j.x[None])[0])
-        room = min([_room(mesh, j.x), *away[away > _SAME * size]])
+        room = min([_room(mesh, j.x), *distance[distance > _SAME * size]])
         parts.append((j.x, float(room), _BRANCH, size))
     kinks = kinks_inside(solution, crack)
     sizes: Floats = cell_sizes(mesh, kinks) if len(kinks) else np.zeros(0)
@@ -536,14 +536,16 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
         One for each.
     crack : int
     """
-    missing = without_estimate(solutions, sifs)
-    if missing is not None:
-        return missing
+    reason_missing = without_estimate(solutions, sifs)
+    if reason_missing is not None:
+        return reason_missing
     if solutions[0].space.order == 2:
         return [_of_spread(sif) for sif in sifs]
-    finer = solve_states(replace(solutions[0].problem, order=2), [s.state for s in solutions])
+    finer_solutions = solve_states(
+        replace(solutions[0].problem, order=2), [s.state for s in solutions]
+    )
     reason = "order 2 has other fronts than order 1: refine the mesh along them"
-    return bars_beside(sifs, _sifs_of_fronts(finer, crack), reason, _rubs(solutions))
+    return bars_beside(sifs, _sifs_of_fronts(finer_solutions, crack), reason, _rubs(solutions))
 
 
 def _sifs_of_fronts(solutions: Sequence[Solution], crack: int) -> list[SIF]:
@@ -573,13 +575,13 @@ def _rubs(solutions: Sequence[Solution]) -> bool:
 
 
 def bars_beside(
-    sifs: Sequence[SIF], better: Sequence[SIF], reason: str, rubs: bool
+    sifs: Sequence[SIF], better_sifs: Sequence[SIF], reason: str, rubs: bool
 ) -> list[KErrors]:
     """Bars of K that are the difference to a better one, which is best.
 
     Parameters
     ----------
-    sifs, better : sequences of SIF
+    sifs, better_sifs : sequences of SIF
         One a state, along the fronts of one crack.
     reason : str
         Why there is none, where the better one has other fronts.
@@ -590,10 +592,10 @@ def bars_beside(
     """
     if any(
         len(np.unique(a.front)) != len(np.unique(b.front))
-        for a, b in zip(sifs, better, strict=True)
+        for a, b in zip(sifs, better_sifs, strict=True)
     ):
         return [no_bars(sif.K.shape, reason) for sif in sifs]
-    return [_of_difference(sif, other, rubs) for sif, other in zip(sifs, better, strict=True)]
+    return [_of_difference(sif, other, rubs) for sif, other in zip(sifs, better_sifs, strict=True)]
 
 
 def _of_spread(sif: SIF) -> KErrors:
@@ -617,14 +619,14 @@ def _half_of_spread(sif: SIF) -> Floats:
     return np.asarray(np.sqrt(np.sum(np.square(parts), axis=0)))
 
 
-def _of_difference(sif: SIF, finer: SIF, rubs: bool) -> KErrors:
+def _of_difference(sif: SIF, finer_sif: SIF, rubs: bool) -> KErrors:
     """K of the other solution is best, and the difference its bar; more where faces rub."""
     better, left = np.empty((2, *sif.K.shape))
-    half = _half_of_spread(finer) if rubs else np.zeros_like(finer.K)
+    half = _half_of_spread(finer_sif) if rubs else np.zeros_like(finer_sif.K)
     for front in np.unique(sif.front):
-        is_on_front, other = sif.front == front, finer.front == front
-        for to, values in ((better, finer.K), (left, half)):
-            to[is_on_front] = _at(sif.x[is_on_front], finer.x[other], values[other])
+        is_on_front, other = sif.front == front, finer_sif.front == front
+        for to, values in ((better, finer_sif.K), (left, half)):
+            to[is_on_front] = _at(sif.x[is_on_front], finer_sif.x[other], values[other])
     eta = better - sif.K
     eta[sif.closed, 0] = 0.0
     mean = _mean(sif, eta)
@@ -644,9 +646,9 @@ def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:
         share = np.einsum("ij,ij->i", x - vertices[nearest], side)
         share = np.clip(share / np.where(square > 0, square, 1.0), 0.0, 1.0)[:, None]
         distance_to_front = np.linalg.norm(x - vertices[nearest] - share * side, axis=1)
-        nearer = distance_to_front < distance
-        between = (1 - share) * values[nearest] + share * values[next_to]
-        result = np.where(nearer[:, None], between, result)
+        is_nearer = distance_to_front < distance
+        interpolated = (1 - share) * values[nearest] + share * values[next_to]
+        result = np.where(is_nearer[:, None], interpolated, result)
         distance = np.minimum(distance, distance_to_front)
     return np.asarray(result)
 
@@ -695,23 +697,25 @@ def finer_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
     list of KErrors
         `best` is K of the finer solution.
     """
-    missing = without_estimate(solutions, sifs)
-    if missing is not None:
-        return missing
+    reason_missing = without_estimate(solutions, sifs)
+    if reason_missing is not None:
+        return reason_missing
     problem = solutions[0].problem
     try:
         scene = replace(problem, mesh=finer_along(problem, crack), order=2)
-        finer = solve_states(scene, [s.state for s in solutions])
+        finer_solutions = solve_states(scene, [s.state for s in solutions])
     except GeometryError as error:
         return [no_bars(sif.K.shape, f"no finer mesh to compare with: {error}") for sif in sifs]
     reason = "the finer mesh has other fronts: refine the mesh along them"
-    return bars_beside(sifs, _sifs_of_fronts(finer, crack), reason, False)
+    return bars_beside(sifs, _sifs_of_fronts(finer_solutions, crack), reason, False)
 
 
 def finer_along(problem: Problem, crack: int) -> Mesh:
     """The mesh with cells along the fronts of one crack that are smaller by 1.5."""
-    mesh, placed = problem.mesh, problem.placed[crack]
-    front = cKDTree(points_between([placed.points[front] for front in placed.fronts or ()]))
+    mesh, placed_crack = problem.mesh, problem.placed[crack]
+    front = cKDTree(
+        points_between([placed_crack.points[front] for front in placed_crack.fronts or ()])
+    )
     centre = mesh.points[mesh.cells].mean(axis=1)
     is_near = front.query(centre)[0] <= _NEAR_FRONT * mesh.cell_size
     each = np.where(is_near, mesh.cell_size / FINER, np.inf)
@@ -745,18 +749,22 @@ def with_bars(
     ProblemError
         "front" in 2D.
     """
-    live = [k for k, s in enumerate(solutions) if not s.at_rest]
+    numbers_under_load = [k for k, s in enumerate(solutions) if not s.at_rest]
     zero = np.zeros_like(sifs[0].K)
     result = [replace(sif, errors=KErrors(zero, zero, ("",) * len(zero))) for sif in sifs]
-    if not live:
+    if not numbers_under_load:
         return result
-    chosen = [solutions[k] for k in live]
+    chosen = [solutions[k] for k in numbers_under_load]
     of_dim = _BARS[by].get(chosen[0].space.dim)
     if of_dim is None:
         raise ProblemError(
             'stress_intensity: error="front" is for fronts in 3D: give True, from one solve.'
         )
-    for k, bars in zip(live, of_dim(chosen, [sifs[k] for k in live], crack), strict=True):
+    for k, bars in zip(
+        numbers_under_load,
+        of_dim(chosen, [sifs[k] for k in numbers_under_load], crack),
+        strict=True,
+    ):
         result[k] = replace(sifs[k], errors=bars)
     return result
 
@@ -789,23 +797,30 @@ def _places_of_finer_cells(solutions: Sequence[Solution]) -> Places | None:
     if space.order == 1:
         return None
     cracks = range(len(space.cracks))
-    general = [reason for c in cracks if (reason := _refusal_of_solution(solution, c))]
-    if general and not all(has_help(reason) for reason in general):
+    general_reasons = [reason for c in cracks if (reason := _refusal_of_solution(solution, c))]
+    if general_reasons and not all(has_help(reason) for reason in general_reasons):
         return None
-    if general:
+    if general_reasons:
         return along_faces(solution) if _is_whole_path(solutions) else None
     pairs = []
     for t, tip in enumerate(space.tips):
         target, size, _ = _least_at_tip(solution, tip.crack, domain_of(solution, t))
         pairs.append((tip.x, target, size))
     for c in cracks:
-        pairs += [(x, room / least, size) for x, room, least, size in _short_parts(solution, c)]
+        pairs += [
+            (x, room / least_cells, size)
+            for x, room, least_cells, size in _short_parts(solution, c)
+        ]
         for s in solutions:
             pairs += [(x, room / _LEG, size) for x, room, size in _room_of_round_kinks(s, c)]
-    few = [(x, max(target / _MARGIN, size / _FINEST)) for x, target, size in pairs if target < size]
-    if not few:
+    places_to_refine = [
+        (x, max(target / _MARGIN, size / _FINEST)) for x, target, size in pairs if target < size
+    ]
+    if not places_to_refine:
         return None
-    return Places(np.array([x for x, _ in few]), np.array([size for _, size in few]))
+    return Places(
+        np.array([x for x, _ in places_to_refine]), np.array([size for _, size in places_to_refine])
+    )
 
 
 _BARS: dict[str, dict[int, _Estimate]] = {

@@ -109,19 +109,19 @@ def bars_by_finer_cells(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", XcrackWarning)  # those of the first solution count
         try:
-            finer = finer_solutions(solutions, places)
+            finer_solutions_ = finer_solutions(solutions, places)
         except XcrackError:
             return None
-        tips = finer[0].space.tips_of(crack)
-        by_tip = [intensity_at_tip(finer, t)[0] for t in tips]
+        tips = finer_solutions_[0].space.tips_of(crack)
+        by_tip = [intensity_at_tip(finer_solutions_, t)[0] for t in tips]
     if len(tips) != len(sifs[0].K):
         return None
-    second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer))]
-    of_second = estimate(finer, second, crack)
+    second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer_solutions_))]
+    of_second = estimate(finer_solutions_, second, crack)
     cells = None
-    if any(c is not None and c.shear is not None for c in finer[0].contact):
-        length = float(finer[0].lips[crack].weight.sum())
-        cells = np.array([domain_of(finer[0], t).size for t in tips]) / length
+    if any(c is not None and c.shear is not None for c in finer_solutions_[0].contact):
+        length = float(finer_solutions_[0].lips[crack].weight.sum())
+        cells = np.array([domain_of(finer_solutions_[0], t).size for t in tips]) / length
     every = zip(sifs, second, of_second, strict=True)
     return [_from_second(*one, cells) for one in every]
 
@@ -146,7 +146,9 @@ def _half_widths_of_friction(second: SIF, change: Floats, cells: Floats) -> Floa
 
 def _from_second(sif: SIF, second: SIF, of_second: KErrors, cells: Floats | None) -> KErrors:
     """Bars of one state from the second solution; with friction by its cells per length."""
-    left = [reason if reason.startswith(_STAYS) else "" for reason in of_second.reasons]
+    reasons_that_stay = [
+        reason if reason.startswith(_STAYS) else "" for reason in of_second.reasons
+    ]
     is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
     best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
     eta = best - sif.K
@@ -157,12 +159,12 @@ def _from_second(sif: SIF, second: SIF, of_second: KErrors, cells: Floats | None
         if cells is None
         else _half_widths_of_friction(second, eta, cells)
     )
-    known = np.hypot(of_second.bar, _ADDED * both)
-    bar = np.where(is_known[:, None], known, half)
-    shut = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
-    bar[sif.closed, 0] = shut[sif.closed]
+    bar_of_second = np.hypot(of_second.bar, _ADDED * both)
+    bar = np.where(is_known[:, None], bar_of_second, half)
+    K_if_open = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
+    bar[sif.closed, 0] = K_if_open[sif.closed]
     contact = np.zeros_like(bar) if of_second.contact is None else np.array(of_second.contact)
-    return bars_of(eta, bar, left, np.where(is_known[:, None], contact, 0.0))
+    return bars_of(eta, bar, reasons_that_stay, np.where(is_known[:, None], contact, 0.0))
 
 
 __all__: list[str] = []

@@ -99,15 +99,15 @@ class FrontMaterials:
 
     def beside_changes(self, s: Floats, size: float) -> tuple[Floats, Bools]:
         """Parameters moved to a cell from where the material changes, and which have been."""
-        read, moved = np.array(s), np.zeros(len(s), dtype=bool)
+        read, is_moved = np.array(s), np.zeros(len(s), dtype=bool)
         for change in self.changes:
             way = s - change
             if self.period is not None:
                 way = np.mod(way + 0.5 * self.period, self.period) - 0.5 * self.period
-            near = np.abs(way) < BESIDE * size
-            read[near] = (s - way + np.where(way < 0, -1, 1) * BESIDE * size)[near]
-            moved |= near
-        return read, moved
+            is_near = np.abs(way) < BESIDE * size
+            read[is_near] = (s - way + np.where(way < 0, -1, 1) * BESIDE * size)[is_near]
+            is_moved |= is_near
+        return read, is_moved
 
 
 def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) -> FrontMaterials:
@@ -149,18 +149,18 @@ def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) 
     _refuse_interface(solution, curve, s, number, changes, size)
     numbers = number[np.append(rows, len(s) - 1)]
     if period is None:
-        breaks = np.concatenate([ends[:1], changes, ends[1:]])
+        break_arcs = np.concatenate([ends[:1], changes, ends[1:]])
     elif len(changes):
-        breaks = np.append(changes, changes[0] + curve.length)
+        break_arcs = np.append(changes, changes[0] + curve.length)
         numbers = numbers[1:]
     else:
-        breaks = ends
+        break_arcs = ends
     references, logarithms = [], []
-    for k, (begin, end) in zip(numbers.tolist(), zip(breaks, breaks[1:]), strict=True):
+    for k, (begin, end) in zip(numbers.tolist(), zip(break_arcs, break_arcs[1:]), strict=True):
         reference, logarithm = _reference(elasticity, curve, k, float(begin), float(end))
         references.append(reference)
         logarithms.append(logarithm)
-    return FrontMaterials(tuple(references), breaks, tuple(logarithms), period)
+    return FrontMaterials(tuple(references), break_arcs, tuple(logarithms), period)
 
 
 def _parameter_between(
@@ -198,13 +198,13 @@ def _refuse_interface(
     if not len(elasticity.number):
         return
     x, frame, _ = curve.at(s)
-    away = np.full(len(s), np.inf)
+    distance = np.full(len(s), np.inf)
     for change in changes:
-        away = np.minimum(away, np.abs(s - change))
+        distance = np.minimum(distance, np.abs(s - change))
     for axis in (0, 1):
         for sign in (-1, 1):
-            beside = cells_at(elasticity.mesh, x + sign * _BESIDE * size * frame[:, axis])
-            on = (elasticity.number[beside] != number) & (away > size)
+            neighbour_cells = cells_at(elasticity.mesh, x + sign * _BESIDE * size * frame[:, axis])
+            on = (elasticity.number[neighbour_cells] != number) & (distance > size)
             if on.any():
                 place = x[int(np.argmax(on))]
                 names = " and ".join(map(repr, sorted({
@@ -219,7 +219,7 @@ def _refuse_interface(
                 )
 
 
-def warn_of_changes(materials: FrontMaterials, curve: FrontCurve, moved: Bools) -> None:
+def warn_of_changes(materials: FrontMaterials, curve: FrontCurve, is_moved: Bools) -> None:
     """Say where a front passes into another material, and what K is there."""
     if not len(materials.changes):
         return
@@ -228,8 +228,8 @@ def warn_of_changes(materials: FrontMaterials, curve: FrontCurve, moved: Bools) 
     places = ", ".join(str(at(each)) for each in x)
     warn(
         f"the front passes into another material at {places}: the stresses at that corner go like "
-        f"another power of the distance, and K has no limit there. The {int(moved.sum())} places "
-        "within a cell of it have K of a cell away (`at_surface`)."
+        f"another power of the distance, and K has no limit there. The {int(is_moved.sum())} "
+        "places within a cell of it have K of a cell away (`at_surface`)."
     )
 
 

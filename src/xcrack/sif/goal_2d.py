@@ -46,7 +46,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     space, tip_material = solution.space, material_at_tip(solution, t)
     mesh, tip = space.mesh, space.tips[t]
     radii = radii_of(domain_of(solution, t))
-    outer, hollow = float(radii.max()), float(inner_radii(space.order, radii).min())
+    outer, inner_radius = float(radii.max()), float(inner_radii(space.order, radii).min())
     inner = float(inner_radii(space.order, radii[:1])[0])
     cut = space.cuts[tip.crack]
     psi = cut.level_set.psi[tip.number]
@@ -56,7 +56,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
         tip_material.lam, tip_material.mu,
     )  # fmt: skip
     parts, plain_parts = [], []
-    for part in ring_parts(solution, t, hollow, outer):
+    for part in ring_parts(solution, t, inner_radius, outer):
         if len(part.plain_cells):
             integrals = plain_ring(
                 part.plain_cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side,
@@ -67,7 +67,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
         for at in part.other_points:
             points = at.points
             change = None
-            if part.differs:
+            if part.has_other_material:
                 change = stiffness_change(solution, t, points.cell, points.bary)
             factor = ring_factors(
                 points.cell, points.bary, points.side[:, tip.crack], points.weight,
@@ -99,9 +99,9 @@ def constant(solution: Solution, t: int) -> Floats:
         for points in class_points(space, cells, n, degree):
             total += scale * volume_terms([solution], ring, points)[0, 0, :2]
     x, cell, bary = tip_place(solution, t)
-    steady = initial_stress_at(solution, cell, bary, x, True)[0]
+    stress_of_tip = initial_stress_at(solution, cell, bary, x, True)[0]
     _, _, per_stress = _faces(solution, t, outer, float(inner_radii(space.order, radii)[0]))
-    return np.asarray(total + np.einsum("ijm,ij->m", per_stress, steady))
+    return np.asarray(total + np.einsum("ijm,ij->m", per_stress, stress_of_tip))
 
 
 def _rotation(solution: Solution, t: int, outer: float) -> Floats:
@@ -120,8 +120,8 @@ def _has_bent_faces(solution: Solution, t: int, outer: float) -> bool:
     """Whether faces in the domain leave the line through the tip."""
     tip = solution.space.tips[t]
     way = solution.lips[tip.crack].x - tip.x
-    across = np.abs(way @ tip.frame[1])[np.linalg.norm(way, axis=1) < outer]
-    return bool((across >= _STRAIGHT * outer).any())
+    normal_distance = np.abs(way @ tip.frame[1])[np.linalg.norm(way, axis=1) < outer]
+    return bool((normal_distance >= _STRAIGHT * outer).any())
 
 
 def _faces(
@@ -138,26 +138,26 @@ def _faces(
         return (), pressure, per_stress
     xi = way[near_points] @ R.T
     xi[np.abs(xi[:, 1]) < _STRAIGHT * outer, 1] = 0.0
-    bent = bool(xi[:, 1].any())
+    is_bent = bool(xi[:, 1].any())
     parts = []
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near_points, s], lips.bary[near_points, s]
         side = lip_side(space, tip.crack, cell, bary, sign)
         r, theta = continued_polar(xi, side[:, tip.crack], np.ones(len(xi), dtype=bool))
-        outward = -sign * lips.normal[near_points] @ R.T
+        outward_normal = -sign * lips.normal[near_points] @ R.T
         q, _ = weight(r, xi, np.array([inner]), np.array([outer]))
         w = scale * q[0] * lips.weight[near_points]
         factor = np.zeros((len(near_points), 2, 2, 2))
         for m, g in enumerate(unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]):
-            pressure[near_points, m] += w * np.einsum("qi,qi->q", outward, g[:, :, 0])
-            if not bent:
+            pressure[near_points, m] += w * np.einsum("qi,qi->q", outward_normal, g[:, :, 0])
+            if not is_bent:
                 continue
             sigma = tip_material.stress(g)
-            local = sigma * outward[:, :1, None]
-            per_stress[:, :, m] += R.T @ np.einsum("q,qij->ij", w * outward[:, 0], g) @ R
-            local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward)
+            local = sigma * outward_normal[:, :1, None]
+            per_stress[:, :, m] += R.T @ np.einsum("q,qij->ij", w * outward_normal[:, 0], g) @ R
+            local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward_normal)
             factor[..., m] = np.einsum("q,ai,qab,bj->qij", w, R, local, R)
-        if bent:
+        if is_bent:
             at = tabulate_functions(space, Points(cell, bary, lips.weight[near_points], side))
             parts.append(GoalPoints(at, factor))
     return parts, pressure, per_stress

@@ -111,8 +111,8 @@ class HandbookK(ReferenceK):
         ----------
         sif : SIF
         """
-        known = self.at(sif)
-        return np.asarray(sif.K_I / known)
+        handbook_K = self.at(sif)
+        return np.asarray(sif.K_I / handbook_K)
 
     def comparison(self, solution: Any) -> str:
         """K of a solution beside this one, in words."""
@@ -121,20 +121,20 @@ class HandbookK(ReferenceK):
             words += f"; outside of where it holds ({self.holds})"
         try:
             sif = stress_intensity(solution, self.crack)
-            known = self.at(sif)
+            handbook_K = self.at(sif)
         except XcrackError as error:
             return f"{words}: no comparison: {error}"
-        inside = ~sif.at_surface
-        ratio = (sif.K_I / known)[inside]
+        is_inside = ~sif.at_surface
+        ratio = (sif.K_I / handbook_K)[is_inside]
         if self.dim == 2:
             pairs = ", ".join(
-                f"K_I {k:.6g} : {h:.6g} = {r:.4f}" for k, h, r in zip(sif.K_I, known, ratio)
+                f"K_I {k:.6g} : {h:.6g} = {r:.4f}" for k, h, r in zip(sif.K_I, handbook_K, ratio)
             )
             return f"{pairs} ({words})"
         return (
-            f"K_I {sif.K_I[inside].min():.6g} to {sif.K_I[inside].max():.6g} : "
-            f"{known[inside].min():.6g} to {known[inside].max():.6g} = {ratio.min():.4f} to "
-            f"{ratio.max():.4f} ({words})"
+            f"K_I {sif.K_I[is_inside].min():.6g} to {sif.K_I[is_inside].max():.6g} : "
+            f"{handbook_K[is_inside].min():.6g} to {handbook_K[is_inside].max():.6g} = "
+            f"{ratio.min():.4f} to {ratio.max():.4f} ({words})"
         )
 
     def __str__(self) -> str:
@@ -436,12 +436,12 @@ class EmbeddedCrack(EllipticFront):
     def _angle_on(self, x: Floats, frame: Floats) -> Floats:
         from_middle = x - (x.max(axis=0) + x.min(axis=0)) / 2
         distance = np.linalg.norm(from_middle, axis=1)
-        long = max(self.a, self.c)
+        long_axis = max(self.a, self.c)
         axis = from_middle[np.argmax(distance)] / distance.max()
-        along = from_middle @ axis
-        across = np.linalg.norm(from_middle - along[:, None] * axis, axis=1)
-        short = min(self.a, self.c)
-        angle = np.arctan2(across / short, np.abs(along) / long)
+        distance_along = from_middle @ axis
+        distance_across = np.linalg.norm(from_middle - distance_along[:, None] * axis, axis=1)
+        short_axis = min(self.a, self.c)
+        angle = np.arctan2(distance_across / short_axis, np.abs(distance_along) / long_axis)
         return np.asarray(angle if self.c >= self.a else pi / 2 - angle)
 
 
@@ -490,9 +490,9 @@ class SurfaceCrack(EllipticFront):
         return _half_angle(x - middle, x[-1] - x[0], self.a, self.c)
 
 
-def _half_angle(from_middle: Floats, along: Floats, a: float, c: float) -> Floats:
+def _half_angle(from_middle: Floats, axis: Floats, a: float, c: float) -> Floats:
     """Parametric angle of points by their parts along a line and across it."""
-    unit = along / np.linalg.norm(along)
+    unit = axis / np.linalg.norm(axis)
     s = from_middle @ unit
     depth = np.linalg.norm(from_middle - s[:, None] * unit, axis=1)
     return np.asarray(np.arctan2(depth / a, np.abs(s) / c))
@@ -507,14 +507,14 @@ def _corner_angle(x: Floats, frame: Floats, a: float, c: float) -> Floats:
     best, angle = np.inf, np.full(len(x), np.nan)
     chord = x[-1] - x[0]
     normal = frame[:, 1].mean(axis=0)
-    across = np.cross(normal, chord / np.linalg.norm(chord))
-    across *= -np.sign(across @ (x[len(x) // 2] - x[0])) or 1.0
+    cross_axis = np.cross(normal, chord / np.linalg.norm(chord))
+    cross_axis *= -np.sign(cross_axis @ (x[len(x) // 2] - x[0])) or 1.0
     length = float(np.linalg.norm(chord))
     for first, last in ((a, c), (c, a)):
         # The corner sees the ends at a right angle, at the distances first and last.
         share = (first**2 - last**2 + length**2) / (2 * length)
         height = np.sqrt(max(first**2 - share**2, 0.0))
-        corner = x[0] + share * chord / length + height * across
+        corner = x[0] + share * chord / length + height * cross_axis
         one, other = x[0] - corner, x[-1] - corner
         u, v = (x - corner) @ one / (one @ one), (x - corner) @ other / (other @ other)
         misfit = float(np.abs(u**2 + v**2 - 1).max())
@@ -594,22 +594,22 @@ class CornerCrackAtHole(EllipticFront):
     @property
     def in_range(self) -> bool:
         """Whether its numbers are within where it holds."""
-        fits = self.a < self.t and self.D + 2 * self.c < self.W / 2
-        return fits and 0.2 <= self.a / self.c <= 2
+        is_in_plate = self.a < self.t and self.D + 2 * self.c < self.W / 2
+        return is_in_plate and 0.2 <= self.a / self.c <= 2
 
     def _factors_along(self, phi: Floats) -> Floats:
         r, q, D, W = self.a / self.c, self.a / self.t, self.D, self.W
-        left, round_part = 1 - np.sin(phi), 1 + 0.1 * (1 - np.cos(phi)) ** 2
+        one_minus_sine, round_part = 1 - np.sin(phi), 1 + 0.1 * (1 - np.cos(phi)) ** 2
         thickness = 0.85 + 0.15 * q**0.25
         if r <= 1:
             m_1, m_2 = 1.13 - 0.09 * r, -0.54 + 0.89 / (0.2 + r)
             m_3 = 0.5 - 1 / (0.65 + r) + 14 * (1 - r) ** 24
-            g_1 = 1 + (0.1 + 0.35 * q**2) * left**2
+            g_1 = 1 + (0.1 + 0.35 * q**2) * one_minus_sine**2
             g_3 = (1 + 0.04 * r) * round_part * thickness
             g_4 = 1 - 0.7 * (1 - q) * (r - 0.2) * (1 - r)
         else:
             m_1, m_2, m_3 = r**-0.5 + 0.04 * r**-1.5, 0.2 * r**-4, -0.11 * r**-4
-            g_1 = 1 + (0.1 + 0.35 / r * q**2) * left**2
+            g_1 = 1 + (0.1 + 0.35 / r * q**2) * one_minus_sine**2
             g_3 = (1.13 - 0.09 / r) * round_part * thickness
             g_4 = 1.0
         z = 1 / (1 + 2 * self.c / D * np.cos(0.85 * phi))

@@ -66,16 +66,16 @@ def constant_part(solution: Solution, t: int) -> float:
     lips = solution.lips[tip.crack]
     at_tip = int(np.argmin(np.linalg.norm(lips.x - tip.x, axis=1)))
     pressure = float(lip_pressure(solution, tip.crack)[at_tip])
-    steady = _steady_stress(solution, t)
+    stress_at_tip = _steady_stress(solution, t)
     contraction = tip_material.lam / (tip_material.lam + 2 * tip_material.mu)
-    return float(steady[0, 0] - contraction * steady[1, 1]) - pressure
+    return float(stress_at_tip[0, 0] - contraction * stress_at_tip[1, 1]) - pressure
 
 
 def _steady_stress(solution: Solution, t: int) -> Floats:
     """Initial stress at the tip in its frame `(d, d)`."""
     tip, (x, cell, bary) = solution.space.tips[t], tip_place(solution, t)
-    steady = initial_stress_at(solution, cell, bary, x, True)[0]
-    return np.asarray(tip.frame @ steady @ tip.frame.T)
+    initial_stress = initial_stress_at(solution, cell, bary, x, True)[0]
+    return np.asarray(tip.frame @ initial_stress @ tip.frame.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ def change_in_cells(solution: Solution, t: int, part: Any) -> Floats | None:
     t : int
     part : RingPart
     """
-    if not part.differs:
+    if not part.has_other_material:
         return None
     bary, cells = simplex_rule(2, part.degree)[0], part.plain_cells
     if not solution.problem.elasticity.is_graded:
@@ -163,7 +163,7 @@ def plain_terms(solutions: Sequence[Solution], ring: IntegrationRing, part: Any)
 
 
 def point_terms(
-    solutions: Sequence[Solution], ring: IntegrationRing, tabulated: Tabulated, differs: bool
+    solutions: Sequence[Solution], ring: IntegrationRing, table: Tabulated, has_other_material: bool
 ) -> Floats:
     """Domain integrals over points of any cells `(s, radii, 3)`.
 
@@ -173,10 +173,10 @@ def point_terms(
 
     space = solutions[0].space
     mesh, tip = space.mesh, space.tips[ring.t]
-    points, gradient = tabulated.points, tabulated.gradients(ring.coefficients)
+    points, gradient = table.points, table.gradients(ring.coefficients)
     result = np.zeros((len(solutions), len(ring.radii), 3))
     change = None
-    if differs:
+    if has_other_material:
         change = stiffness_change(solutions[0], ring.t, points.cell, points.bary)
     add_points(
         result, gradient, points.cell, points.bary, points.side[:, tip.crack], points.weight,
@@ -193,14 +193,14 @@ def volume_terms(solutions: Sequence[Solution], ring: IntegrationRing, points: P
     x = position(space, points.cell, points.bary)
     xi = (x - tip.x) @ tip.frame.T
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
-    behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
-    r, theta = continued_polar(xi, points.side[:, tip.crack], behind)
+    is_behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
+    r, theta = continued_polar(xi, points.side[:, tip.crack], is_behind)
     result = np.zeros((len(solutions), len(ring.radii), 3))
     q, dq = weight(r, xi, ring.inner, ring.radii)
-    weighted = points.weight[:, None] * dq  # (radii, q, d)
+    weighted_slope = points.weight[:, None] * dq  # (radii, q, d)
     for m, field in enumerate(_auxiliary_fields(solutions, ring.t, r, theta)):
         for s, solution in enumerate(solutions):
-            result[s, :, m] += _load_terms(solution, ring.t, points, x, field, q, weighted)
+            result[s, :, m] += _load_terms(solution, ring.t, points, x, field, q, weighted_slope)
     return result
 
 
@@ -230,11 +230,11 @@ def ahead_derivative(tip_material: Isotropic, r: Floats, theta: Floats) -> Float
     step = 1e-5 * r
     shifted = []
     for sign in (1, -1):
-        moved = x + sign * step
-        turn = np.arctan2(y, moved)
-        continued = turn + 2 * np.pi * np.round((theta - turn) / (2 * np.pi))
+        moved_x = x + sign * step
+        turn = np.arctan2(y, moved_x)
+        angle = turn + 2 * np.pi * np.round((theta - turn) / (2 * np.pi))
         constants = tip_material.kolosov, tip_material.mu
-        shifted.append(unit_gradients(np.hypot(moved, y), continued, *constants))
+        shifted.append(unit_gradients(np.hypot(moved_x, y), angle, *constants))
     return np.asarray((shifted[0] - shifted[1]) / (2 * step)[:, None, None])
 
 
@@ -257,14 +257,14 @@ def _load_terms(
             total -= np.einsum("q,qi,qi,rq->r", points.weight, b, field.gradient[:, :, 0], q)
         if "initial_stress" in load.acts:
             where = x, points.cell, points.bary
-            everywhere = factor * elasticity.initial_stress(load, *where, exact=True)
+            initial_stress = factor * elasticity.initial_stress(load, *where, exact=True)
             at_tip = factor * elasticity.initial_stress(load, *tip_place(solution, t), exact=True)
-            full = np.einsum("ai,qij,bj->qab", R, everywhere, R)
-            change = np.einsum("ai,qij,bj->qab", R, everywhere - at_tip, R)
-            steady = R @ at_tip[0] @ R.T
+            stress_in_frame = np.einsum("ai,qij,bj->qab", R, initial_stress, R)
+            change = np.einsum("ai,qij,bj->qab", R, initial_stress - at_tip, R)
+            stress_of_tip = R @ at_tip[0] @ R.T
             total += np.einsum("q,qij,qij,rq->r", points.weight, change, field.curve, q)
-            total += np.einsum("qij,qi,rqj->r", full, field.gradient[:, :, 0], dq)
-            total -= np.einsum("ij,qij,rq->r", steady, field.gradient, dq[..., 0])
+            total += np.einsum("qij,qi,rqj->r", stress_in_frame, field.gradient[:, :, 0], dq)
+            total -= np.einsum("ij,qij,rq->r", stress_of_tip, field.gradient, dq[..., 0])
     return total
 
 
@@ -280,30 +280,30 @@ def lip_terms(solutions: Sequence[Solution], ring: IntegrationRing) -> Floats:
     if not is_near.any():
         return result
     pressure = np.stack([lip_pressure(s, tip.crack)[is_near] for s in solutions])
-    shears = [
+    shear_of_solutions = [
         None if x is None else x[is_near] for x in (lip_shear(s, tip.crack) for s in solutions)
     ]
     R = tip.frame
     xi = way[is_near] @ R.T
     # The last piece is straight: what differs there is round-off, which 1 / r would magnify.
     xi[np.abs(xi[:, 1]) < 1e-9 * radii.max(), 1] = 0.0
-    bent = bool(xi[:, 1].any())
-    rubs = any(shear is not None and shear.any() for shear in shears)
-    if not bent and not pressure.any() and not rubs:
+    is_bent = bool(xi[:, 1].any())
+    has_friction = any(shear is not None and shear.any() for shear in shear_of_solutions)
+    if not is_bent and not pressure.any() and not has_friction:
         return result
     # Both faces at once, face - first.
     cell, bary = lips.cell[is_near], lips.bary[is_near]
     faces = [lip_side(space, tip.crack, cell[:, s], bary[:, s], 2 * s - 1) for s in (0, 1)]
     gradient, shear = np.zeros((0, 2, 2, len(solutions))), np.zeros((0, len(xi), 2))
-    if bent:
+    if is_bent:
         places = cell.T.ravel(), np.concatenate([bary[:, 0], bary[:, 1]])
         gradient = gradients_at(space, ring.coefficients, *places, np.concatenate(faces))
-    if rubs:
-        shear = np.stack([np.zeros_like(xi) if x is None else x for x in shears])
-    steady = np.stack([_steady_stress(solution, t) for solution in solutions])
+    if has_friction:
+        shear = np.stack([np.zeros_like(xi) if x is None else x for x in shear_of_solutions])
+    stress_at_tip = np.stack([_steady_stress(solution, t) for solution in solutions])
     _, *constants = _constants(solutions[0], ring)
     add_lips(
         result, xi, lips.normal[is_near] @ R.T, np.stack([face[:, tip.crack] for face in faces]),
-        lips.weight[is_near], pressure, shear, gradient, steady, *constants,
+        lips.weight[is_near], pressure, shear, gradient, stress_at_tip, *constants,
     )  # fmt: skip
     return result

@@ -58,9 +58,9 @@ def front_nodes(
     count = int(np.clip(_STEPS * (last - first) / width.min(), _STEPS, 100_000))
     s = np.linspace(first, last, count + 1)
     density = 1 / spacing((s[1:] + s[:-1]) / 2)
-    passed = np.concatenate([[0.0], np.cumsum(density * np.diff(s))])
-    steps = max(_FEWEST[curve.closed], round(passed[-1]))
-    knots = np.interp(np.arange(steps + 1) / steps * passed[-1], passed, s)
+    knot_count = np.concatenate([[0.0], np.cumsum(density * np.diff(s))])
+    steps = max(_FEWEST[curve.closed], round(knot_count[-1]))
+    knots = np.interp(np.arange(steps + 1) / steps * knot_count[-1], knot_count, s)
     return np.asarray(knots[:-1] if curve.closed else knots)
 
 
@@ -83,26 +83,26 @@ def hats(curve: FrontCurve, knots: Floats, s: Floats) -> tuple[Ints, Floats, Flo
         Derivative of the second by the parameter.
     """
     count = len(knots)
-    left = np.searchsorted(knots, s, side="right") - 1
+    left_knot = np.searchsorted(knots, s, side="right") - 1
     if curve.closed:
         width = np.diff(np.append(knots, knots[0] + curve.length))
-        t = np.mod(s - knots[left], curve.length) / width[left]
-        hat = np.stack([np.mod(left, count), np.mod(left + 1, count)], axis=1)
+        t = np.mod(s - knots[left_knot], curve.length) / width[left_knot]
+        hat = np.stack([np.mod(left_knot, count), np.mod(left_knot + 1, count)], axis=1)
     else:
-        left = np.clip(left, 0, count - 2)
+        left_knot = np.clip(left_knot, 0, count - 2)
         width = np.diff(knots)
-        t = np.clip((s - knots[left]) / width[left], 0.0, 1.0)
-        hat = np.stack([left, left + 1], axis=1)
-    return np.ascontiguousarray(hat), t * t * (3 - 2 * t), 6 * t * (1 - t) / width[left]
+        t = np.clip((s - knots[left_knot]) / width[left_knot], 0.0, 1.0)
+        hat = np.stack([left_knot, left_knot + 1], axis=1)
+    return np.ascontiguousarray(hat), t * t * (3 - 2 * t), 6 * t * (1 - t) / width[left_knot]
 
 
-def reading(knots: Floats, valid: Bools, curve: FrontCurve, s: Floats) -> Floats:
+def reading(knots: Floats, is_valid: Bools, curve: FrontCurve, s: Floats) -> Floats:
     """Matrix that makes values at parameters of those at valid tops of hats: cubic splines.
 
     Parameters
     ----------
     knots : (p,) array, length
-    valid : (p,) array of bool
+    is_valid : (p,) array of bool
         v of them.
     curve : FrontCurve
     s : (m,) array, length
@@ -112,11 +112,11 @@ def reading(knots: Floats, valid: Bools, curve: FrontCurve, s: Floats) -> Floats
     (m, v) array
         Beyond the valid tops the value is that of the last of them.
     """
-    grid, at = knots[valid], np.asarray(s, dtype=float)
+    grid, at = knots[is_valid], np.asarray(s, dtype=float)
     values = np.eye(len(grid))
     if len(grid) < 2:
         return np.ones((len(at), len(grid)))
-    if curve.closed and valid.all():
+    if curve.closed and is_valid.all():
         spline = CubicSpline(
             np.append(grid, grid[0] + curve.length),
             np.concatenate([values, values[:1]]),
@@ -143,15 +143,15 @@ def domain_integrals(
     weight: Floats,
     gradient: Floats,
     side: Ints,
-    behind: Bools,
+    is_behind: Bools,
     tip_material: Isotropic,
     radii: Floats,
     *,
     force: Floats | None = None,
-    initial: Callable[[Floats], Floats] | None = None,
+    initial_stress: Callable[[Floats], Floats] | None = None,
     stress_change: Floats | None = None,
     rise: Floats | None = None,
-    curved: bool = True,
+    is_curved: bool = True,
 ) -> Floats:
     """Domain integrals over points of the body; those of all chunks add up.
 
@@ -166,14 +166,14 @@ def domain_integrals(
         Displacement gradients of n states; rows are components, columns directions.
     side : (q,) array of int
         Side of the crack; 0 where that means nothing.
-    behind : (q,) array of bool
+    is_behind : (q,) array of bool
         Behind the front, where the angle of a point follows the crack face of its side.
     tip_material : Isotropic
     radii : (p, k) array, length
         Of the domains of each hat.
     force : (q, 3, n) array, stress/length, optional
         Body forces.
-    initial : callable, optional
+    initial_stress : callable, optional
         f(x) -> (q, 3, 3, n), initial stress at points: its value at the foot of a point counts
         in sigma : eps^a, its change from there by the derivative of eps^a.
     stress_change : (q, 3, 3, n) array, stress, optional
@@ -182,7 +182,7 @@ def domain_integrals(
     rise : (q,) array, 1/length, optional
         Derivative of ln E along the front, where `gradient` is that of u times E over that of
         `tip_material`.
-    curved : bool
+    is_curved : bool
         Without, curvature and twist are left out for comparison.
 
     Returns
@@ -194,17 +194,17 @@ def domain_integrals(
 
     states = gradient.shape[3]
     total = np.zeros((states, radii.shape[1], 3, len(knots)))
-    r, theta = continued_polar(feet.local, side, behind)
+    r, theta = continued_polar(feet.local, side, is_behind)
     hat, share, step = hats(curve, knots, feet.s)
-    steady, change = _initial_stress(curve, feet, initial, states)
+    foot_stress, change = _initial_stress(curve, feet, initial_stress, states)
     if stress_change is not None:
         change = change + stress_change if len(change) else np.ascontiguousarray(stress_change)
-        steady = steady if len(steady) else np.zeros_like(change)
+        foot_stress = foot_stress if len(foot_stress) else np.zeros_like(change)
     front_terms(
         np.ascontiguousarray(weight),
         np.ascontiguousarray(gradient),
         np.zeros((0, 3, states)) if force is None else np.ascontiguousarray(force),
-        steady + change,
+        foot_stress + change,
         change,
         np.stack([r, theta], axis=1),
         feet.frame,
@@ -215,7 +215,7 @@ def domain_integrals(
         np.ascontiguousarray(radii, dtype=float),
         tip_material.lam,
         tip_material.mu,
-        curved,
+        is_curved,
         np.zeros(0) if rise is None else np.ascontiguousarray(rise),
         total,
     )
@@ -225,16 +225,16 @@ def domain_integrals(
 def _initial_stress(
     curve: FrontCurve,
     feet: FootPoints,
-    initial: Callable[[Floats], Floats] | None,
+    initial_stress: Callable[[Floats], Floats] | None,
     states: int,
 ) -> tuple[Floats, Floats]:
     """Initial stress at the feet, and what it changes from there to the points."""
-    if initial is None:
+    if initial_stress is None:
         return np.zeros((0, 3, 3, states)), np.zeros((0, 3, 3, states))
     at_foot = curve.at(feet.s)[0]
     x = at_foot + np.einsum("qa,qad->qd", feet.local, feet.frame[:, :2])
-    steady = np.ascontiguousarray(initial(at_foot))
-    return steady, np.ascontiguousarray(initial(x) - steady)
+    foot_stress = np.ascontiguousarray(initial_stress(at_foot))
+    return foot_stress, np.ascontiguousarray(initial_stress(x) - foot_stress)
 
 
 def lip_integrals(
@@ -248,7 +248,7 @@ def lip_integrals(
     radii: Floats,
     *,
     gradient: Floats | None = None,
-    initial: Callable[[Floats], Floats] | None = None,
+    initial_stress: Callable[[Floats], Floats] | None = None,
 ) -> Floats:
     """What both crack faces add to the integrals, for true tractions on them.
 
@@ -268,7 +268,7 @@ def lip_integrals(
     gradient : (2, q, 3, 3, n) array, optional
         Displacement gradients on lip - and lip +: needed where the crack faces are not the
         half-plane of the frame, since the auxiliary field has a traction of its own there.
-    initial : callable, optional
+    initial_stress : callable, optional
         Initial stress, as in `domain_integrals`; only counts with gradients.
 
     Returns
@@ -284,7 +284,7 @@ def lip_integrals(
         side_integrals(
             curve, knots, feet, -sign * normal, weight, sign * traction,
             np.full(len(weight), sign), every, tip_material, radii,
-            gradient=None if gradient is None else gradient[s], initial=initial,
+            gradient=None if gradient is None else gradient[s], initial_stress=initial_stress,
         )
         for s, sign in ((0, -1), (1, 1))
     ]  # fmt: skip
@@ -295,30 +295,30 @@ def side_integrals(
     curve: FrontCurve,
     knots: Floats,
     feet: FootPoints,
-    outward: Floats,
+    outward_normal: Floats,
     weight: Floats,
     traction: Floats,
     side: Ints,
-    behind: Bools,
+    is_behind: Bools,
     tip_material: Isotropic,
     radii: Floats,
     *,
     gradient: Floats | None = None,
-    initial: Callable[[Floats], Floats] | None = None,
+    initial_stress: Callable[[Floats], Floats] | None = None,
 ) -> Floats:
     """What a side of the body, or one crack face, adds to the integrals.
 
     Parameters
     ----------
-    curve, knots, feet, weight, side, behind, tip_material, radii
+    curve, knots, feet, weight, side, is_behind, tip_material, radii
         As of `domain_integrals`; weights are areas.
-    outward : (q, 3) array
+    outward_normal : (q, 3) array
         Normals that point out of the body.
     traction : (q, 3, n) array, stress
         True tractions of n states.
     gradient : (q, 3, 3, n) array, optional
         Displacement gradients; without them only the tractions count.
-    initial : callable, optional
+    initial_stress : callable, optional
         Initial stress; only counts with gradients.
 
     Returns
@@ -332,14 +332,14 @@ def side_integrals(
     if not len(weight):
         return total
     hat, share, _ = hats(curve, knots, feet.s)
-    r, theta = continued_polar(feet.local, side, behind)
-    steady, _ = _initial_stress(curve, feet, initial, states)
+    r, theta = continued_polar(feet.local, side, is_behind)
+    foot_stress, _ = _initial_stress(curve, feet, initial_stress, states)
     surface_terms(
         np.ascontiguousarray(weight),
-        np.ascontiguousarray(outward),
+        np.ascontiguousarray(outward_normal),
         np.ascontiguousarray(traction),
         np.zeros((0, 3, 3, states)) if gradient is None else np.ascontiguousarray(gradient),
-        steady,
+        foot_stress,
         np.stack([r, theta], axis=1),
         feet.frame,
         hat,
@@ -352,7 +352,7 @@ def side_integrals(
     return total
 
 
-def means(I: Floats, knots: Floats, curve: FrontCurve, tip_material: Isotropic) -> Floats:  # noqa: E741
+def mean_integrals(I: Floats, knots: Floats, curve: FrontCurve, tip_material: Isotropic) -> Floats:  # noqa: E741
     """Means of K over the hats `(n, p, 3)`, stress · √length.
 
     Parameters
@@ -372,7 +372,7 @@ def solve_front(
     knots: Floats,
     curve: FrontCurve,
     tip_material: Isotropic,
-    valid: Bools,
+    is_valid: Bools,
     zero: Bools | None = None,
 ) -> Floats:
     """K at the tops of the hats: a cubic spline along the front that has the integrals found.
@@ -384,7 +384,7 @@ def solve_front(
     knots : (p,) array, length
     curve : FrontCurve
     tip_material : Isotropic
-    valid : (p,) array of bool
+    is_valid : (p,) array of bool
         Hats that have an integral.
     zero : (p,) array of bool, optional
         Hats at planes of symmetry: K_III is zero there.
@@ -395,10 +395,10 @@ def solve_front(
         nan at hats that are not valid.
     """
     K = np.full((*I.shape[:2], len(knots), 3), np.nan)
-    rows = np.nonzero(valid)[0]
+    rows = np.nonzero(is_valid)[0]
     if not len(rows):
         return K
-    moments = _moments(curve, knots, lambda s: reading(knots, valid, curve, s))[rows]
+    moments = _moments(curve, knots, lambda s: reading(knots, is_valid, curve, s))[rows]
     K[:, :, rows] = _K_of_integrals(
         moments, I[..., rows], tip_material, None if zero is None else zero[rows]
     )
@@ -410,14 +410,14 @@ def twice_as_wide(
     knots: Floats,
     curve: FrontCurve,
     tip_material: Isotropic,
-    valid: Bools,
+    is_valid: Bools,
     zero: Bools | None = None,
 ) -> Floats:
     """K at the tops of the hats from every other hat, each with the halves of those beside it.
 
     Parameters
     ----------
-    I, knots, curve, tip_material, valid, zero
+    I, knots, curve, tip_material, is_valid, zero
         As of `solve_front`.
 
     Returns
@@ -426,23 +426,23 @@ def twice_as_wide(
         nan at hats that are not valid.
     """
     result = np.full((*I.shape[:2], len(knots), 3), np.nan)
-    rows = np.nonzero(valid)[0]
+    rows = np.nonzero(is_valid)[0]
     if not len(rows):
         return result
-    whole = bool(valid.all())
+    is_whole = bool(is_valid.all())
     pick = np.arange(0, len(rows), 2)
-    if not (curve.closed and whole) and pick[-1] != len(rows) - 1:
+    if not (curve.closed and is_whole) and pick[-1] != len(rows) - 1:
         pick = np.append(pick, len(rows) - 1)
     share = np.zeros((len(pick), len(knots)))
     share[np.arange(len(pick)), rows[pick]] = 1.0
-    for between in np.setdiff1d(np.arange(len(rows)), pick):
-        after = int(np.searchsorted(pick, between))
-        for wide in (after - 1, after % len(pick)):
-            share[wide, rows[between]] += 0.5
+    for row_between in np.setdiff1d(np.arange(len(rows)), pick):
+        next_pick = int(np.searchsorted(pick, row_between))
+        for wide_row in (next_pick - 1, next_pick % len(pick)):
+            share[wide_row, rows[row_between]] += 0.5
     tops = rows[pick]
 
     def spline(s: Floats) -> Floats:
-        if whole:
+        if is_whole:
             return reading(knots[tops], np.ones(len(tops), dtype=bool), curve, s)
         return reading(knots, np.isin(np.arange(len(knots)), tops), curve, s)
 
@@ -461,11 +461,11 @@ def _K_of_integrals(
     """K `(n, k, v, 3)` of integrals `(n, k, 3, v)`; K_III is zero at some tops."""
     K = np.empty((*I.shape[:2], len(moments), 3))
     for mode, factor in enumerate(_factors(tip_material)):
-        matrix, right = moments.copy(), I[:, :, mode]
+        matrix, rhs = moments.copy(), I[:, :, mode]
         if mode == 2 and zero is not None:
             matrix[zero] = np.eye(len(matrix))[zero]
-            right = np.where(zero, 0.0, right)
-        K[..., mode] = np.einsum("ij,nkj->nki", np.linalg.inv(matrix), right) * factor
+            rhs = np.where(zero, 0.0, rhs)
+        K[..., mode] = np.einsum("ij,nkj->nki", np.linalg.inv(matrix), rhs) * factor
     return K
 
 

@@ -166,16 +166,16 @@ class Bimaterial:
         return float(E_mean * np.cosh(np.pi * self.epsilon) ** 2)
 
     def unit_fields(
-        self, r: Floats, theta: Floats, above: Bools, length: float
+        self, r: Floats, theta: Floats, is_above: Bools, length: float
     ) -> tuple[Floats, Floats]:
         """Gradients of unit K_1 and K_2, and their derivatives ahead `(2, q, 2, 2)` each."""
         a_1, a_2 = self.a
         exponent = -0.5 - 1j * self.epsilon
         log_z = np.log(r) + 1j * theta
-        z, conjugate = np.exp(log_z), np.exp(np.conj(log_z))
-        a, other = np.where(above, a_1, a_2), np.where(above, a_2, a_1)
+        z, z_conjugate = np.exp(log_z), np.exp(np.conj(log_z))
+        a, other = np.where(is_above, a_1, a_2), np.where(is_above, a_2, a_1)
         kolosov, mu = (
-            np.where(above, *(getattr(m, name) for m in self.materials))
+            np.where(is_above, *(getattr(m, name) for m in self.materials))
             for name in ("kolosov", "mu")
         )
         gradients, bends = np.empty((2, len(r), 2, 2)), np.empty((2, len(r), 2, 2))
@@ -186,14 +186,16 @@ class Bimaterial:
             F_bar = [C * np.exp(exponent * np.conj(log_z))]
             for k in range(2):
                 F.append((exponent - k) * F[k] / z)
-                F_bar.append((exponent - k) * F_bar[k] / conjugate)
+                F_bar.append((exponent - k) * F_bar[k] / z_conjugate)
             for n, result in ((0, gradients), (1, bends)):
                 Phi, Omega = F[n] / a, F_bar[n] / other
-                bent = (z - conjugate) * np.conj(F[n + 1] / a)
-                along = (kolosov * Phi - Omega - bent) / (2 * mu)
-                across = 1j * (kolosov * Phi + Omega - 2 * np.conj(Phi) + bent) / (2 * mu)
-                result[mode, :, 0, 0], result[mode, :, 1, 0] = along.real, along.imag
-                result[mode, :, 0, 1], result[mode, :, 1, 1] = across.real, across.imag
+                slope_term = (z - z_conjugate) * np.conj(F[n + 1] / a)
+                slope_along = (kolosov * Phi - Omega - slope_term) / (2 * mu)
+                slope_across = (
+                    1j * (kolosov * Phi + Omega - 2 * np.conj(Phi) + slope_term) / (2 * mu)
+                )
+                result[mode, :, 0, 0], result[mode, :, 1, 0] = slope_along.real, slope_along.imag
+                result[mode, :, 0, 1], result[mode, :, 1, 1] = slope_across.real, slope_across.imag
         return gradients, bends
 
 
@@ -251,18 +253,18 @@ def _straight_radius(solution: Solution, t: int, outer: float) -> float:
     tip = solution.space.tips[t]
     cells = tip_cells(solution, t)
     height = (mesh.points[mesh.cells[cells]].mean(axis=1) - tip.x) @ tip.frame[1]
-    above = elasticity.number[cells[np.argmax(height)]]
-    below = elasticity.number[cells[np.argmin(height)]]
+    number_above = elasticity.number[cells[np.argmax(height)]]
+    number_below = elasticity.number[cells[np.argmin(height)]]
     corners = (mesh.points[mesh.cells] - tip.x) @ tip.frame.T
     number = elasticity.number
-    fits = (number == above) & (corners[..., 1].min(axis=1) >= -_FLAT * outer)
-    fits |= (number == below) & (corners[..., 1].max(axis=1) <= _FLAT * outer)
-    near = np.linalg.norm(corners, axis=2).min(axis=1)
-    room = float(near[~fits].min(initial=np.inf))
+    is_in_half = (number == number_above) & (corners[..., 1].min(axis=1) >= -_FLAT * outer)
+    is_in_half |= (number == number_below) & (corners[..., 1].max(axis=1) <= _FLAT * outer)
+    nearest_corner = np.linalg.norm(corners, axis=2).min(axis=1)
+    room = float(nearest_corner[~is_in_half].min(initial=np.inf))
     lips = solution.lips[tip.crack]
     way = lips.way_from(mesh, tip.x) @ tip.frame.T
-    bent = np.abs(way[:, 1]) > _FLAT * outer
-    return min(room, float(np.linalg.norm(way[bent], axis=1).min(initial=np.inf)), outer)
+    is_off_line = np.abs(way[:, 1]) > _FLAT * outer
+    return min(room, float(np.linalg.norm(way[is_off_line], axis=1).min(initial=np.inf)), outer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,28 +278,30 @@ class RingPoints:
     theta: Floats
     gradient: Floats
     stress: Floats
-    initial: Floats
+    initial_stress: Floats
 
 
-def _ring_points(solution: Solution, t: int, hollow: float, outer: float) -> Iterator[RingPoints]:
+def _ring_points(
+    solution: Solution, t: int, inner_radius: float, outer: float
+) -> Iterator[RingPoints]:
     space, tip = solution.space, solution.space.tips[t]
     mesh, R = space.mesh, tip.frame
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
     distance = distances_to(space, tip.x)
     turn = mean_rotation(solution, distance, outer)
-    for cells, n, degree in ring_classes(space, tip.x, hollow, outer):
+    for cells, n, degree in ring_classes(space, tip.x, inner_radius, outer):
         for points in class_points(space, cells, n, degree):
             x = position(space, points.cell, points.bary)
             xi = (x - tip.x) @ R.T
-            behind = psi[mesh.cells[points.cell]].mean(axis=1) < 0
-            r, theta = continued_polar(xi, points.side[:, tip.crack], behind)
+            is_behind = psi[mesh.cells[points.cell]].mean(axis=1) < 0
+            r, theta = continued_polar(xi, points.side[:, tip.crack], is_behind)
             place = points.cell, points.bary
             columns = solution.coefficients[..., None]
             gradient = gradients_at(space, columns, *place, points.side)[..., 0] - turn
-            initial = initial_stress_at(solution, *place, x)
-            sigma = solution.problem.elasticity.stress(gradient, *place) + initial
-            turned = (R @ value @ R.T for value in (gradient, sigma, initial))
-            yield RingPoints(points, x, xi, r, theta, *turned)
+            initial_stress = initial_stress_at(solution, *place, x)
+            sigma = solution.problem.elasticity.stress(gradient, *place) + initial_stress
+            in_frame = (R @ value @ R.T for value in (gradient, sigma, initial_stress))
+            yield RingPoints(points, x, xi, r, theta, *in_frame)
 
 
 def _integrals(
@@ -310,18 +314,18 @@ def _integrals(
     for ring in _ring_points(solution, t, 0.0 if sources else float(inner.min()), outer):
         q, dq = weight(ring.r, ring.xi, inner, radii)
         w = ring.points.weight
-        above = ring.xi[:, 1] > 0
-        fields, bends = body.unit_fields(ring.r, ring.theta, above, length)
+        is_above = ring.xi[:, 1] > 0
+        fields, bends = body.unit_fields(ring.r, ring.theta, is_above, length)
         force = _force(solution, t, ring)
         for m in range(2):
             g = fields[m]
             aux = np.empty_like(g)
-            for side, material in zip((above, ~above), body.materials, strict=True):
+            for side, material in zip((is_above, ~is_above), body.materials, strict=True):
                 aux[side] = material.stress(g[side])
             flux = np.einsum("qij,qi->qj", ring.stress, g[:, :, 0])
             flux += np.einsum("qij,qi->qj", aux, ring.gradient[:, :, 0])
-            flux[:, 0] -= np.einsum("qij,qij->q", ring.stress - ring.initial, g)
-            source = np.einsum("qij,qij->q", ring.initial, bends[m])
+            flux[:, 0] -= np.einsum("qij,qij->q", ring.stress - ring.initial_stress, g)
+            source = np.einsum("qij,qij->q", ring.initial_stress, bends[m])
             source -= np.einsum("qi,qi->q", force, g[:, :, 0])
             total[:, m] += np.einsum("q,qj,rqj->r", w, flux, dq)
             total[:, m] += np.einsum("q,q,rq->r", w, source, q)
@@ -344,28 +348,28 @@ def _lip_integrals(
     space, tip = solution.space, solution.space.tips[t]
     lips, R = solution.lips[tip.crack], tip.frame
     way = lips.way_from(space.mesh, tip.x)
-    near = np.linalg.norm(way, axis=1) < radii.max()
+    is_near = np.linalg.norm(way, axis=1) < radii.max()
     total = np.zeros((len(radii), 2))
-    pressure, shear = lip_pressure(solution, tip.crack)[near], lip_shear(solution, tip.crack)
+    pressure, shear = lip_pressure(solution, tip.crack)[is_near], lip_shear(solution, tip.crack)
     if not pressure.any() and shear is None:
         return total
-    xi = way[near] @ R.T
+    xi = way[is_near] @ R.T
     xi[:, 1] = 0.0
-    normal = lips.normal[near] @ R.T
+    normal = lips.normal[is_near] @ R.T
     for side in (-1, 1):
         s = (side + 1) // 2
-        sides = lip_side(space, tip.crack, lips.cell[near, s], lips.bary[near, s], side)
+        sides = lip_side(space, tip.crack, lips.cell[is_near, s], lips.bary[is_near, s], side)
         sign = sides[:, tip.crack]
         r, theta = continued_polar(xi, sign, np.ones(len(xi), dtype=bool))
         theta = np.where(sign * np.sign(theta) < 0, -theta, theta)
         traction = side * pressure[:, None] * normal
         if shear is not None:
-            traction = traction + side * (shear[near] @ R.T)
+            traction = traction + side * (shear[is_near] @ R.T)
         q, _ = weight(r, xi, _INNER * radii, radii)
         fields, _ = body.unit_fields(r, theta, theta > 0, length)
         for m in range(2):
             density = np.einsum("qi,qi->q", traction, fields[m][:, :, 0])
-            total[:, m] += q @ (lips.weight[near] * density)
+            total[:, m] += q @ (lips.weight[is_near] * density)
     return total
 
 
@@ -375,7 +379,7 @@ def _energy_release(solution: Solution, t: int, radii: Floats) -> float:
     for ring in _ring_points(solution, t, 0.0, float(radii.max())):
         q, dq = weight(ring.r, ring.xi, _INNER * radii, radii)
         g = ring.gradient
-        energy = 0.5 * np.einsum("qij,qij->q", ring.stress + ring.initial, g)
+        energy = 0.5 * np.einsum("qij,qij->q", ring.stress + ring.initial_stress, g)
         flux = np.einsum("qij,qi->qj", ring.stress, g[:, :, 0])
         flux[:, 0] -= energy
         force = np.einsum("qi,qi->q", _force(solution, t, ring), g[:, :, 0])

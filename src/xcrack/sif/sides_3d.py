@@ -49,7 +49,7 @@ class Sides:
     normal: Floats
     feet: FootPoints
     reaction: Bools
-    smooth: Bools
+    is_smooth: Bools
 
 
 def before_junctions(space: FunctionSpace, crack: int, side: Ints) -> Bools:
@@ -90,7 +90,7 @@ def sides_around(
         FootPoints(*(np.concatenate([getattr(one, n) for one in feet])
                      for n in ("s", "local", "frame", "turn"))),
         np.concatenate([part.reaction for part in parts]),
-        np.concatenate([part.smooth for part in parts]),
+        np.concatenate([part.is_smooth for part in parts]),
     )  # fmt: skip
 
 
@@ -108,20 +108,20 @@ def _boundary_around(
     if not len(facets):
         return None
     points, normal = facet_points(space, facets, halvings=_HALVINGS)
-    near, feet = curve.near(position(space, points.cell, points.bary), reach)
-    if not len(near):
+    near_points, feet = curve.points_near(position(space, points.cell, points.bary), reach)
+    if not len(near_points):
         return None
-    counts = before_junctions(space, crack, points.side[near])
-    near, feet = near[counts], feet.chosen(counts)
-    if not len(near):
+    counts = before_junctions(space, crack, points.side[near_points])
+    near_points, feet = near_points[counts], feet.chosen(counts)
+    if not len(near_points):
         return None
-    points, normal = points.chosen(near), normal[near]
+    points, normal = points.chosen(near_points), normal[near_points]
     facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
     axes = _fixed_axes(solutions, facet)
-    along = np.abs(np.einsum("qd,qd->q", normal, axes)) > 1 - _ALONG
-    across = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
-    smooth = (axes.sum(axis=1) == 1) & along & across
-    return Sides(points, normal, feet, axes.any(axis=1) & ~smooth, smooth)
+    is_along_axis = np.abs(np.einsum("qd,qd->q", normal, axes)) > 1 - _ALONG
+    is_across_front = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
+    is_smooth = (axes.sum(axis=1) == 1) & is_along_axis & is_across_front
+    return Sides(points, normal, feet, axes.any(axis=1) & ~is_smooth, is_smooth)
 
 
 def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: float) -> list[Sides]:
@@ -134,20 +134,20 @@ def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: fl
         corner = cut.lip_points(mesh)
         middle = corner.mean(axis=1)
         size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1, initial=0.0)
-        most = float(size.max(initial=0.0))
-        rows = np.nonzero(curve.distance(middle, reach + 2 * most) <= reach + 2 * size)[0]
+        largest_size = float(size.max(initial=0.0))
+        rows = np.nonzero(curve.distance(middle, reach + 2 * largest_size) <= reach + 2 * size)[0]
         owner, local = cut.lip_cell[rows, k], cut.lip_bary[rows, k]
         number, place, weight = part_points(space, mesh.cells[owner], local, halvings=_HALVINGS)
         cell = owner[number]
         bary = np.einsum("qv,qvb->qb", place, local[number])
-        near, feet = curve.near(position(space, cell, bary), reach)
-        cell, bary, weight = cell[near], bary[near], weight[near]
+        near_points, feet = curve.points_near(position(space, cell, bary), reach)
+        cell, bary, weight = cell[near_points], bary[near_points], weight[near_points]
         sides = lip_side(space, joint.on, cell, bary, joint.side)
         counts = before_junctions(space, crack, sides)
         points = Points(cell, bary, weight, sides).chosen(counts)
-        normal = -joint.side * cut.lip_normal[rows][number[near]][counts]
-        never = np.zeros(len(points.cell), dtype=bool)
-        result.append(Sides(points, normal, feet.chosen(counts), never, never))
+        normal = -joint.side * cut.lip_normal[rows][number[near_points]][counts]
+        no_points = np.zeros(len(points.cell), dtype=bool)
+        result.append(Sides(points, normal, feet.chosen(counts), no_points, no_points))
     return result
 
 
@@ -162,10 +162,10 @@ def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> Floats:
         is_of_set = np.isin(facet, numbers_of(mesh, facet_set(mesh, support.where, support.name)))
         if is_of_set.any():
             middle = mesh.points[mesh.facets[facet[is_of_set]]].mean(axis=1)
-            fixed = ~np.isnan(support.displacement_at(middle))
+            is_fixed = ~np.isnan(support.displacement_at(middle))
             # What is not the same everywhere along a side makes it no plane of symmetry.
             axes[is_of_set] = np.maximum(
-                axes[is_of_set], fixed if support.holds or support.is_uniform else 1.0
+                axes[is_of_set], is_fixed if support.holds or support.is_uniform else 1.0
             )
     return axes
 
@@ -185,7 +185,7 @@ def on_smooth_planes(sides: Sides, curve: FrontCurve, knots: Floats) -> Bools:
     result = np.zeros(len(knots), dtype=bool)
     hat, share, _ = hats(curve, knots, sides.feet.s)
     for place, value in ((0, 1 - share), (1, share)):
-        result[hat[sides.smooth & (value > 0.5), place]] = True
+        result[hat[sides.is_smooth & (value > 0.5), place]] = True
     return result
 
 
@@ -217,14 +217,14 @@ def integrals_of_sides(
     space, points = solutions[0].space, sides.points
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side) - turn
-    free = np.zeros((len(points.cell), 3, len(solutions)))
+    no_traction = np.zeros((len(points.cell), 3, len(solutions)))
     total = _integrals(
         solutions,
         t,
         points,
         sides.normal,
         sides.feet,
-        free,
+        no_traction,
         curve,
         knots,
         radii,
@@ -232,8 +232,10 @@ def integrals_of_sides(
         gradient,
     )
     reach, crack = float(radii.max()), space.tips[t].crack
-    loaded = _loaded_points(solutions, curve, reach) + _face_points(solutions, crack, curve, reach)
-    for points, normal, feet, traction in loaded:
+    loaded_parts = _loaded_points(solutions, curve, reach) + _face_points(
+        solutions, crack, curve, reach
+    )
+    for points, normal, feet, traction in loaded_parts:
         counts = before_junctions(space, crack, points.side)
         if not counts.all():
             points, normal, feet, traction = (
@@ -261,12 +263,12 @@ def _integrals(
     space = solutions[0].space
     tip = space.tips[t]
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
-    behind = np.einsum("qb,qb->q", psi[space.mesh.cells[points.cell]], points.bary) < 0
-    side, initial = points.side[:, tip.crack], initial_stresses(solutions)
+    is_behind = np.einsum("qb,qb->q", psi[space.mesh.cells[points.cell]], points.bary) < 0
+    side, initial_stress = points.side[:, tip.crack], initial_stresses(solutions)
     if materials.is_one:
         return side_integrals(
-            curve, knots, feet, normal, points.weight, traction, side, behind,
-            materials.references[0], radii, gradient=gradient, initial=initial,
+            curve, knots, feet, normal, points.weight, traction, side, is_behind,
+            materials.references[0], radii, gradient=gradient, initial_stress=initial_stress,
         )  # fmt: skip
     total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     for material, rows, ratio in materials.parts(feet.s):
@@ -275,7 +277,8 @@ def _integrals(
             local_gradient = local_gradient * ratio[0][:, None, None, None]
         total += side_integrals(
             curve, knots, feet.chosen(rows), normal[rows], points.weight[rows], traction[rows],
-            side[rows], behind[rows], material, radii, gradient=local_gradient, initial=initial,
+            side[rows], is_behind[rows], material, radii, gradient=local_gradient,
+            initial_stress=initial_stress,
         )  # fmt: skip
     return total
 
@@ -293,14 +296,14 @@ def _loaded_points(
         facets = facet_set(mesh, load.where, load.name)
         middle = mesh.points[facets].mean(axis=1)
         size = np.linalg.norm(mesh.points[facets] - middle[:, None], axis=2).max(axis=1)
-        close = curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size
-        if not close.any():
+        is_close = curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size
+        if not is_close.any():
             continue
         points, on_facets = outer_points(space, load, _HALVINGS)
-        near, feet = curve.near(on_facets.x, reach)
+        near_points, feet = curve.points_near(on_facets.x, reach)
         factor = np.array([sum(f for one, f in s.acting if one is load) for s in solutions])
-        traction = load.traction(on_facets)[near, :, None] * factor
-        result.append((points.chosen(near), on_facets.normal[near], feet, traction))
+        traction = load.traction(on_facets)[near_points, :, None] * factor
+        result.append((points.chosen(near_points), on_facets.normal[near_points], feet, traction))
     return result
 
 
@@ -326,12 +329,12 @@ def _face_points(
                 traction[:, :, n] += shear
         if not traction.any():
             continue
-        near, feet = curve.near(lips.x, reach)
-        cell, bary = lips.cell[near, k], lips.bary[near, k]
+        near_points, feet = curve.points_near(lips.x, reach)
+        cell, bary = lips.cell[near_points, k], lips.bary[near_points, k]
         sides = lip_side(space, joint.on, cell, bary, joint.side)
-        points = Points(cell, bary, lips.weight[near], sides)
-        normal = -joint.side * lips.normal[near]
-        result.append((points, normal, feet, joint.side * traction[near]))
+        points = Points(cell, bary, lips.weight[near_points], sides)
+        normal = -joint.side * lips.normal[near_points]
+        result.append((points, normal, feet, joint.side * traction[near_points]))
     return result
 
 

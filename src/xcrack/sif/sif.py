@@ -48,11 +48,11 @@ def bars_of(
     eta: Floats, bar: Floats, reasons: Sequence[str], contact: Floats | None = None
 ) -> KErrors:
     """Estimates with nan where there is a reason against them."""
-    against = np.array([bool(reason) for reason in reasons], dtype=bool)[:, None]
-    part = None if contact is None else lock(np.where(against, np.nan, contact))
+    has_reason = np.array([bool(reason) for reason in reasons], dtype=bool)[:, None]
+    part = None if contact is None else lock(np.where(has_reason, np.nan, contact))
     return KErrors(
-        lock(np.where(against, np.nan, eta)),
-        lock(np.where(against, np.nan, bar)),
+        lock(np.where(has_reason, np.nan, eta)),
+        lock(np.where(has_reason, np.nan, bar)),
         tuple(reasons),
         part,
     )
@@ -173,8 +173,8 @@ class SIF:
                 numbers(getattr(self, name), f"SIF: {name}", shape, must_be_finite=False)
         if self.errors is not None and not isinstance(self.errors, KErrors):
             raise ProblemError(f"SIF: errors = {value_text(self.errors)}: give KErrors or None.")
-        known = isinstance(self.ends, tuple)
-        if not known or not all(isinstance(end, SurfaceEnd) for end in self.ends):
+        is_tuple = isinstance(self.ends, tuple)
+        if not is_tuple or not all(isinstance(end, SurfaceEnd) for end in self.ends):
             raise ProblemError(f"SIF: ends = {value_text(self.ends)}: give a tuple of SurfaceEnd.")
 
     @property
@@ -286,8 +286,8 @@ class SIF:
         if self.K.shape[1] == 3:
             return self._values_along()
         rows = ", ".join(
-            f"({k[0]:.6g}, {k[1]:.6g}){' closed' if closed else ''}"
-            for k, closed in zip(self.K, self.closed, strict=True)
+            f"({k[0]:.6g}, {k[1]:.6g}){' is_closed' if is_closed else ''}"
+            for k, is_closed in zip(self.K, self.closed, strict=True)
         )
         return f"SIF(K = [{rows}]{self._bars()})"
 
@@ -310,8 +310,10 @@ class SIF:
         if self.errors is None or not len(self.K):
             return ""
         if self.K.shape[1] == 3:
-            good = np.isfinite(self.bar).all(axis=1)
-            longest = self.bar[good].max(axis=0, initial=np.nan if not good.any() else 0.0)
+            is_finite = np.isfinite(self.bar).all(axis=1)
+            longest = self.bar[is_finite].max(
+                axis=0, initial=np.nan if not is_finite.any() else 0.0
+            )
             return f"; bars of the best up to {', '.join(f'{b:.2g}' for b in longest)}"
         rows = [
             reason or ", ".join(f"{k:.6g} ± {b:.2g}" for k, b in zip(best, bar, strict=True))
@@ -340,10 +342,10 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
     def rows(name: str, *shape: int) -> Any:
         """Values of all parts one behind the other; None where a part has none."""
         values = [getattr(part, name) for part in parts]
-        known = [value for value in values if value is not None]
-        if len(known) < len(values):
+        given_values = [value for value in values if value is not None]
+        if len(given_values) < len(values):
             return None
-        return lock(np.concatenate([np.zeros((0, *shape)), *known]))
+        return lock(np.concatenate([np.zeros((0, *shape)), *given_values]))
 
     return sound(
         SIF,

@@ -61,28 +61,31 @@ class Specimen:
         ProblemError
             As of `Problem`.
         """
-        given: dict[str, Any] = {
+        arguments: dict[str, Any] = {
             "cracks": self.cracks,
             "loads": self.loads,
             "supports": self.supports,
             "handbook": self.handbook,
             **choices,
         }
-        return Problem(self.mesh, material, **given)
+        return Problem(self.mesh, material, **arguments)
 
     def __repr__(self) -> str:
         return f"Specimen({self.handbook}; {self.mesh!r})"
 
 
 def _sizes(width: float, size: float | None, size_near: float | None) -> dict[str, Any]:
-    far = width / _COARSE if size is None else size
-    return {"size": far, "size_near": min(width / _FINE, far) if size_near is None else size_near}
+    far_size = width / _COARSE if size is None else size
+    return {
+        "size": far_size,
+        "size_near": min(width / _FINE, far_size) if size_near is None else size_near,
+    }
 
 
-def _check_crack(a: float, most: float, what: str) -> None:
-    if not a < most:
+def _check_crack(a: float, limit: float, what: str) -> None:
+    if not a < limit:
         raise GeometryError(
-            f"{what}: a = {a:g}: the crack leaves no ligament: give less than {most:g}."
+            f"{what}: a = {a:g}: the crack leaves no ligament: give less than {limit:g}."
         )
 
 
@@ -267,18 +270,19 @@ def single_edge_tension(
 
 
 def _strip(
-    W: float, ends: tuple[float, float], left: float, height: float | None, stress: float,
-    sizes: dict[str, Any], known: HandbookK,
+    W: float, ends: tuple[float, float], left_side: float, height: float | None, stress: float,
+    sizes: dict[str, Any], handbook_K: HandbookK,
 ) -> Specimen:  # fmt: skip
     height = 4 * W if height is None else height
     # The crack lies beside the points of the mesh.
     mesh = plate(
-        W, height, lower=(left, -height / 2), along=[(left, 0.0), (left + W, 0.0)], band=W / 20,
+        W, height, lower=(left_side, -height / 2), along=[(left_side, 0.0), (left_side + W, 0.0)],
+        band=W / 20,
         transition=W / 2, **sizes,
     )  # fmt: skip
     loads = traction("top", (0.0, stress)), traction("bottom", (0.0, -stress))
     crack = line_crack([(x, 0.0) for x in ends])
-    return Specimen(mesh, (crack,), loads, known)
+    return Specimen(mesh, (crack,), loads, handbook_K)
 
 
 @check_arguments(ProblemError)
@@ -377,9 +381,10 @@ def lug(
     if not D < W:
         raise GeometryError(f"lug: D = {D:g}: it does not fit into W = {W:g}: make it smaller.")
     _check_crack(a, (W - D) / 2, "lug")
-    half, long = W / 2, 2 * W if length is None else length
+    half, half_length = W / 2, 2 * W if length is None else length
     mesh = plate(
-        outline=[(-half, -long), (half, -long), (half, 0.0), ((0.0, half), (-half, 0.0))],
+        outline=[(-half, -half_length), (half, -half_length), (half, 0.0), ((0.0, half), (-half,
+        0.0))],
         holes=[((0.0, 0.0), D / 2)], along=[(D / 2, 0.0), (half, 0.0)], band=W / 20,
         transition=W / 2, sets={"bottom": [0], "right": [1], "head": [2], "left": [3]},
         **_sizes(W, size, size_near),

@@ -111,15 +111,18 @@ def stress_intensities(
     if elasticity.is_uniform:
         elasticity.materials[0].at_tip()  # refuses where K is not defined
     # Cycles from nothing are the most common ones: their lower state has no K to look for.
-    live = [s for s in solutions if not s.at_rest] or solutions[:1]
+    solutions_under_load = [s for s in solutions if not s.at_rest] or solutions[:1]
     ends = space.tips_of(crack)
     doubts: list[str] = []
     with threads(solutions[0].problem.numerics.threads):
         if space.dim < 3:
-            by_end, doubts = tip_intensities(live, ends)
+            by_end, doubts = tip_intensities(solutions_under_load, ends)
         else:
-            by_end = [front_intensity(live, t) for t in ends]
-    by_state = [joined_sif([states[k] for states in by_end], space.dim) for k in range(len(live))]
+            by_end = [front_intensity(solutions_under_load, t) for t in ends]
+    by_state = [
+        joined_sif([states[k] for states in by_end], space.dim)
+        for k in range(len(solutions_under_load))
+    ]
     place = np.cumsum([not s.at_rest for s in solutions]) - 1
     result = [
         _without_K(by_state[0]) if s.at_rest else by_state[k]
@@ -130,11 +133,11 @@ def stress_intensities(
     if error:
         result = with_bars(solutions, result, crack, error if isinstance(error, str) else "")
     else:
-        warn_of_order(live[0], crack)
+        warn_of_order(solutions_under_load[0], crack)
     if space.dim < 3 and len(ends):
-        doubts = [*doubts, *doubts_at_kinks(live, crack)]
+        doubts = [*doubts, *doubts_at_kinks(solutions_under_load, crack)]
         parts = [sif for sif, s in zip(result, solutions, strict=True) if not s.at_rest]
-        warn_of(doubts, live, parts or result[:1], space.tips[ends[0]].radius)
+        warn_of(doubts, solutions_under_load, parts or result[:1], space.tips[ends[0]].radius)
     return result
 
 

@@ -86,9 +86,9 @@ def _size(crack: Crack, source: Source) -> str:
         return f"length {units.value(f'{of_crack.area:.5g}', LENGTH)}"
     if np.isnan(of_crack.depth) or not of_crack.traces:
         return f"area {units.value(f'{of_crack.area:.5g}', (2.0, 0.0))}"
-    deepest = max(of_crack.traces, key=lambda trace: trace.depth)
+    trace = max(of_crack.traces, key=lambda trace: trace.depth)
     return (f"depth {units.value(f'{of_crack.depth:.5g}', LENGTH)}, length "
-            f"{units.value(f'{deepest.length:.5g}', LENGTH)} on {deepest.name}")  # fmt: skip
+            f"{units.value(f'{trace.length:.5g}', LENGTH)} on {trace.name}")  # fmt: skip
 
 
 def _growth(source: Source) -> Rows:

@@ -8,38 +8,38 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def _curve_at(s, breaks, place, value, slope, bend):  # type: ignore[no-untyped-def]
+def _curve_at(s, break_arcs, place, value, slope, bend):  # type: ignore[no-untyped-def]
     """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first.
 
     Straight beyond its ends.
     """
-    low, high = 0, len(breaks) - 2
+    low, high = 0, len(break_arcs) - 2
     while low < high:
         middle = (low + high + 1) // 2
-        if breaks[middle] <= s:
+        if break_arcs[middle] <= s:
             low = middle
         else:
             high = middle - 1
-    inside = min(max(s, breaks[0]), breaks[-1])
-    t, over = inside - breaks[low], s - inside
+    clamped_s = min(max(s, break_arcs[0]), break_arcs[-1])
+    t, excess = clamped_s - break_arcs[low], s - clamped_s
     for i in range(3):
         c3, c2 = place[0, low, i], place[1, low, i]
         c1, c0 = place[2, low, i], place[3, low, i]
         value[i] = ((c3 * t + c2) * t + c1) * t + c0
         slope[i] = (3 * c3 * t + 2 * c2) * t + c1
         bend[i] = 6 * c3 * t + 2 * c2
-        if over != 0.0:
-            value[i] += over * slope[i]
+        if excess != 0.0:
+            value[i] += excess * slope[i]
             bend[i] = 0.0
 
 
 @kernel
-def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
+def frames_at(s, break_arcs, place, normal):  # type: ignore[no-untyped-def]
     """Points of a front and how its frame turns there.
 
     Parameters
     ----------
-    s, breaks : (q,) array, (m + 1,) array
+    s, break_arcs : (q,) array, (m + 1,) array
         Parameters; beyond the breaks the front is straight.
     place, normal : (4, m, 3) arrays
         Spline coefficients of the points and of the normals.
@@ -59,8 +59,8 @@ def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
     dx, ddx = np.empty(3), np.empty(3)
     N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
     for q in range(count):
-        _curve_at(s[q], breaks, place, x[q], dx, ddx)
-        _curve_at(s[q], breaks, normal, N, dN, ddN)
+        _curve_at(s[q], break_arcs, place, x[q], dx, ddx)
+        _curve_at(s[q], break_arcs, normal, N, dN, ddN)
         _frame(dx, ddx, N, dN, frame[q], turn[q])
     return x, frame, turn
 
@@ -68,13 +68,13 @@ def frames_at(s, breaks, place, normal):  # type: ignore[no-untyped-def]
 @kernel
 def _frame(dx, ddx, N, dN, frame, turn):  # type: ignore[no-untyped-def]
     speed = math.sqrt(dx[0] * dx[0] + dx[1] * dx[1] + dx[2] * dx[2])
-    along = 0.0
+    projection = 0.0
     for i in range(3):
         frame[2, i] = dx[i] / speed
-        along += N[i] * frame[2, i]
+        projection += N[i] * frame[2, i]
     size = 0.0
     for i in range(3):
-        frame[1, i] = N[i] - along * frame[2, i]
+        frame[1, i] = N[i] - projection * frame[2, i]
         size += frame[1, i] ** 2
     size = math.sqrt(size)
     for i in range(3):
@@ -82,19 +82,19 @@ def _frame(dx, ddx, N, dN, frame, turn):  # type: ignore[no-untyped-def]
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         frame[0, i] = frame[1, j] * frame[2, k] - frame[1, k] * frame[2, j]
-    kt, kn, moved = 0.0, 0.0, 0.0
+    kt, kn, drift = 0.0, 0.0, 0.0
     for i in range(3):
         kt += ddx[i] * frame[0, i]
         kn += ddx[i] * frame[1, i]
-        moved += dN[i] * frame[0, i]
+        drift += dN[i] * frame[0, i]
     turn[0] = kt / speed**2
     turn[1] = kn / speed**2
-    turn[2] = -(moved / speed - along * turn[0]) / size
+    turn[2] = -(drift / speed - projection * turn[0]) / size
     turn[3] = speed
 
 
 @kernel
-def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-untyped-def]
+def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore[no-untyped-def]
     """Project points onto a front: (x - X(s)) . X'(s) = 0 by Newton's method.
 
     Parameters
@@ -104,10 +104,10 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
         First guesses of the parameter.
     reach : float
         Longest step of an iteration, in the parameter.
-    breaks : (m + 1,) array
+    break_arcs : (m + 1,) array
     place, normal : (4, m, 3) arrays
         Spline coefficients of the points and of the normals.
-    closed : bool
+    is_closed : bool
 
     Returns
     -------
@@ -124,12 +124,12 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
     frame, turn = np.empty((count, 3, 3)), np.empty((count, 4))
     X, dX, ddX = np.empty(3), np.empty(3), np.empty(3)
     N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
-    first, last = breaks[0], breaks[-1]
+    first, last = break_arcs[0], break_arcs[-1]
     period = last - first
     for q in range(count):
         u = start[q]
         for _ in range(30):
-            _curve_at(u, breaks, place, X, dX, ddX)
+            _curve_at(u, break_arcs, place, X, dX, ddX)
             f, df, square = 0.0, 0.0, 0.0
             for i in range(3):
                 gap = x[q, i] - X[i]
@@ -139,17 +139,17 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
             df = square - df
             step = f / (df if df > 0.1 * square else square)
             step = min(max(step, -reach), reach)
-            old = u
+            previous_u = u
             u += step
-            if closed:
+            if is_closed:
                 if u < first:
                     u += period
                 elif u > last:
                     u -= period
-            if abs(step) <= 1e-14 * period or u == old:
+            if abs(step) <= 1e-14 * period or u == previous_u:
                 break
-        _curve_at(u, breaks, place, X, dX, ddX)
-        _curve_at(u, breaks, normal, N, dN, ddN)
+        _curve_at(u, break_arcs, place, X, dX, ddX)
+        _curve_at(u, break_arcs, normal, N, dN, ddN)
         _frame(dX, ddX, N, dN, frame[q], turn[q])
         s[q] = u
         x1, x2 = 0.0, 0.0
@@ -162,7 +162,7 @@ def feet(x, start, reach, breaks, place, normal, closed):  # type: ignore[no-unt
 
 
 @kernel
-def _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend):  # type: ignore[no-untyped-def]
+def _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend):  # type: ignore[no-untyped-def]
     """Field of Williams of one mode, and more, from the cosine and sine of half the angle.
 
     U (t, n, b), its gradient G along t, n; d/dtheta: turned, spin; d/dx1: slope (of turned), bend.
@@ -186,7 +186,7 @@ def _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend
         g1 = scale * (0.5 * (b * ch - a * sh) + 1.5 * (d * c3 - e * s3))
         g2 = -scale * (0.25 * (a * ch + b * sh) + 2.25 * (e * c3 + d * s3))
         U[i] = root * g
-        turned[i] = root * g1
+        U_turn[i] = root * g1
         p0, p1 = 0.5 * g * c - g1 * s, 0.5 * g * s + g1 * c
         d0 = -0.5 * (g1 * c + g * s) - g2 * s
         d1 = 0.5 * (g * c - g1 * s) + g2 * c
@@ -233,15 +233,15 @@ def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
         x, y, z = frame[a, 0], frame[a, 1], frame[a, 2]
         first = x * tensor[0, 0] + y * tensor[1, 0] + z * tensor[2, 0]
         second = x * tensor[0, 1] + y * tensor[1, 1] + z * tensor[2, 1]
-        third = x * tensor[0, 2] + y * tensor[1, 2] + z * tensor[2, 2]
+        third_value = x * tensor[0, 2] + y * tensor[1, 2] + z * tensor[2, 2]
         for b in range(3):
-            result[a, b] = first * frame[b, 0] + second * frame[b, 1] + third * frame[b, 2]
+            result[a, b] = first * frame[b, 0] + second * frame[b, 1] + third_value * frame[b, 2]
 
 
 @kernel
 def front_terms(  # type: ignore[no-untyped-def]
-    weight, gradient, force, initial, change, polar, frame, turn, hat, share, step, radii,
-    lam, mu, curved, slopes, result,
+    weight, gradient, force, initial_stress, change, polar, frame, turn, hat, share, step, radii,
+    lam, mu, is_curved, slopes, result,
 ):  # fmt: skip
     """Add the domain integrals of points to those of the hats.
 
@@ -253,7 +253,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         Displacement gradients of n states; rows are components.
     force : (q or 0, 3, n) array
         Body force, if any.
-    initial, change : (q or 0, 3, 3, n) arrays
+    initial_stress, change : (q or 0, 3, 3, n) arrays
         Initial stress, if any, and how it differs from that at the foot.
     polar, frame, turn : (q, 2), (q, 3, 3) and (q, 4) arrays
         Radius and angle; frame and its curvatures at the foot.
@@ -267,7 +267,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         Of the domains of each hat.
     lam, mu : float
         Lamé constants.
-    curved : bool
+    is_curved : bool
         Count the curvatures and the twist; without, for comparison, they are taken as zero.
     slopes : (q or 0,) array, 1/length
         Derivative of the logarithm of the modulus along the front, if it changes.
@@ -277,12 +277,12 @@ def front_terms(  # type: ignore[no-untyped-def]
     states = gradient.shape[3]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
-    U, turned, slope = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    U, U_turn, slope = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     G, spin, bend = np.empty((3, 3, 2)), np.empty((3, 3, 2)), np.empty((3, 3, 2))
     S, dS = np.empty((3, 3, 3)), np.empty((3, 3))
     X, X1, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     g, sigma = np.empty((3, 3)), np.empty((3, 3))
-    S0, more = np.zeros((3, 3)), np.zeros((3, 3))
+    S0, S1 = np.zeros((3, 3)), np.zeros((3, 3))
     domains = radii.shape[1]
     value, slope_r, change_s = (
         np.empty((2, domains)),
@@ -296,7 +296,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
         c, s = ch * ch - sh * sh, 2.0 * sh * ch
         kt, kn, w = turn[q, 0], turn[q, 1], turn[q, 2]
-        if not curved:
+        if not is_curved:
             kt = kn = w = 0.0
         hs = 1.0 - r * (kt * c + kn * s)
         for side in range(2):
@@ -309,13 +309,13 @@ def front_terms(  # type: ignore[no-untyped-def]
                 change_s[side, k] = weight[q] * rise * Q
         for m in range(3):
             _unit_field(
-                m, r, ch, sh, kolosov, scale, U[m], turned[m], G[m], slope[m], spin[m], bend[m]
+                m, r, ch, sh, kolosov, scale, U[m], U_turn[m], G[m], slope[m], spin[m], bend[m]
             )
             _unit_stress(G[m], lam, mu, S[m])
             _unit_stress(spin[m], lam, mu, dS)
-            X[m, 0] = (kt * U[m, 2] - w * (U[m, 1] + turned[m, 0])) / hs
-            X[m, 1] = (kn * U[m, 2] + w * (U[m, 0] - turned[m, 1])) / hs
-            X[m, 2] = -(kt * U[m, 0] + kn * U[m, 1] + w * turned[m, 2]) / hs
+            X[m, 0] = (kt * U[m, 2] - w * (U[m, 1] + U_turn[m, 0])) / hs
+            X[m, 1] = (kn * U[m, 2] + w * (U[m, 0] - U_turn[m, 1])) / hs
+            X[m, 2] = -(kt * U[m, 0] + kn * U[m, 1] + w * U_turn[m, 2]) / hs
             X1[m, 0] = (kt * G[m, 2, 0] - w * (G[m, 1, 0] + slope[m, 0])) / hs
             X1[m, 1] = (kn * G[m, 2, 0] + w * (G[m, 0, 0] - slope[m, 1])) / hs
             X1[m, 2] = -(kt * G[m, 0, 0] + kn * G[m, 1, 0] + w * slope[m, 2]) / hs
@@ -337,22 +337,22 @@ def front_terms(  # type: ignore[no-untyped-def]
                 for b in range(3):
                     sigma[a, b] = mu * (g[a, b] + g[b, a])
                 sigma[a, a] += trace
-            if len(initial) > 0:
-                _into_frame(frame[q], initial[q, :, :, n], S0)
-                _into_frame(frame[q], change[q, :, :, n], more)
+            if len(initial_stress) > 0:
+                _into_frame(frame[q], initial_stress[q, :, :, n], S0)
+                _into_frame(frame[q], change[q, :, :, n], S1)
                 sigma += S0
             for m in range(3):
                 W, p0, p1, p2, p12, p22, volume = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 for i in range(3):
                     G0, G1, X2 = G[m, i, 0], G[m, i, 1], X[m, i]
-                    W += (sigma[i, 0] - more[i, 0]) * G0 + (sigma[i, 1] - more[i, 1]) * G1
+                    W += (sigma[i, 0] - S1[i, 0]) * G0 + (sigma[i, 1] - S1[i, 1]) * G1
                     p0 += sigma[i, 0] * G0 + S[m, i, 0] * g[i, 0]
                     p1 += sigma[i, 1] * G0 + S[m, i, 1] * g[i, 0]
                     p2 += sigma[i, 2] * G0 + S[m, i, 2] * g[i, 0]
                     p12 += sigma[i, 2] * G1 + S[m, i, 2] * g[i, 1]
                     p22 += sigma[i, 2] * X2 + S[m, i, 2] * g[i, 2]
                     volume += sigma[i, 2] * X1[m, i] + D[m, i] * g[i, 0]
-                    volume += more[i, 0] * bend[m, i, 0] + more[i, 1] * bend[m, i, 1]
+                    volume += S1[i, 0] * bend[m, i, 0] + S1[i, 1] * bend[m, i, 1]
                 p0 -= W
                 p22 -= W
                 volume += (w * p12 - kt * p22) / hs
@@ -362,20 +362,21 @@ def front_terms(  # type: ignore[no-untyped-def]
                         for i in range(3):
                             f += frame[q, a, i] * force[q, i, n]
                         volume -= f * G[m, a, 0]
-                radial = p0 * c + p1 * s
-                along = p2 / hs / turn[q, 3]
+                along_radius = p0 * c + p1 * s
+                along_front = p2 / hs / turn[q, 3]
                 for side in range(2):
                     for k in range(domains):
                         result[n, k, m, hat[q, side]] += (
                             value[side, k] * volume
-                            + slope_r[side, k] * radial
-                            + change_s[side, k] * along
+                            + slope_r[side, k] * along_radius
+                            + change_s[side, k] * along_front
                         )
 
 
 @kernel
 def surface_terms(  # type: ignore[no-untyped-def]
-    weight, outward, traction, gradient, initial, polar, frame, hat, share, radii, lam, mu, result,
+    weight, outward_normal, traction, gradient, initial_stress, polar, frame, hat, share, radii,
+    lam, mu, result,
 ):  # fmt: skip
     """Subtract the integrals of P_kj m_j V_k over a lip or a side from those of the hats.
 
@@ -383,13 +384,13 @@ def surface_terms(  # type: ignore[no-untyped-def]
     ----------
     weight : (q,) array
         Area of each point.
-    outward : (q, 3) array
+    outward_normal : (q, 3) array
         Normal m that points out of the body.
     traction : (q, 3, n) array
         True traction there, of n states.
     gradient : (q or 0, 3, 3, n) array
         Displacement gradients; without them the surface counts as free of auxiliary traction.
-    initial : (q or 0, 3, 3, n) array
+    initial_stress : (q or 0, 3, 3, n) array
         Initial stress at the foot, if any.
     polar, frame, hat, share, radii, lam, mu
         As of `front_terms`.
@@ -399,7 +400,7 @@ def surface_terms(  # type: ignore[no-untyped-def]
     states = traction.shape[2]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
-    U, turned, slope = np.empty(3), np.empty(3), np.empty(3)
+    U, U_turn, slope = np.empty(3), np.empty(3), np.empty(3)
     G, spin, bend, S = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 3))
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(len(weight)):
@@ -409,10 +410,10 @@ def surface_terms(  # type: ignore[no-untyped-def]
         for a in range(3):
             m_out[a] = 0.0
             for i in range(3):
-                m_out[a] += frame[q, a, i] * outward[q, i]
+                m_out[a] += frame[q, a, i] * outward_normal[q, i]
         ch, sh = math.cos(0.5 * polar[q, 1]), math.sin(0.5 * polar[q, 1])
         for mode in range(3):
-            _unit_field(mode, r, ch, sh, kolosov, scale, U, turned, G, slope, spin, bend)
+            _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend)
             _unit_stress(G, lam, mu, S)
             for n in range(states):
                 density = 0.0
@@ -426,8 +427,8 @@ def surface_terms(  # type: ignore[no-untyped-def]
                     for a in range(3):
                         for b in range(3):
                             sigma[a, b] = 0.0
-                    if len(initial) > 0:
-                        _into_frame(frame[q], initial[q, :, :, n], sigma)
+                    if len(initial_stress) > 0:
+                        _into_frame(frame[q], initial_stress[q, :, :, n], sigma)
                     trace = lam * (g[0, 0] + g[1, 1] + g[2, 2])
                     W = 0.0
                     for a in range(3):

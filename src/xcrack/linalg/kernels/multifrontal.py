@@ -756,16 +756,16 @@ def places_of_squares(order, rank, begin, height, is_packed, level):  # type: ig
 
 
 @kernel
-def unchanged_parts(fronts, previous):  # type: ignore[no-untyped-def]
+def unchanged_parts(fronts, previous_factor):  # type: ignore[no-untyped-def]
     """Parts whose entries and whose children's places are those of before `(parts,)`.
 
     Parameters
     ----------
-    fronts, previous : tuples of arrays
+    fronts, previous_factor : tuples of arrays
         first, begin, in_parent, start, row, value, order, rank.
     """
     first, begin, in_parent, start, row, value, order, rank = fronts
-    first0, begin0, in_parent0, start0, row0, value0 = previous[:6]
+    first0, begin0, in_parent0, start0, row0, value0 = previous_factor[:6]
     parts = len(order)
     is_unchanged = np.zeros(parts, dtype=np.bool_)
     for t in range(parts):

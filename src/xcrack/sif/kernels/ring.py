@@ -8,7 +8,7 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def cells_between(points, cells, size, centre, hollow, radius):  # type: ignore[no-untyped-def]
+def cells_between(points, cells, size, centre, inner_radius, radius):  # type: ignore[no-untyped-def]
     """Cells that may have points between two radii, increasing `(k,)`.
 
     Parameters
@@ -18,15 +18,15 @@ def cells_between(points, cells, size, centre, hollow, radius):  # type: ignore[
     size : (m,) array, length
         Longest edge of each cell.
     centre : (d,) array
-    hollow, radius : float, length
-        A cell is left out where all its corners are within `hollow`, or its centroid is farther
-        than its size outside `radius`.
+    inner_radius, radius : float, length
+        A cell is left out where all its corners are within `inner_radius`, or its centroid is
+        farther than its size outside `radius`.
     """
     corners, d = cells.shape[1], points.shape[1]
     chosen = np.empty(len(cells), np.int64)
     count = 0
     for e in range(len(cells)):
-        farthest, square_of_point = 0.0, 0.0
+        farthest_square, square_of_point = 0.0, 0.0
         for j in range(d):
             mean = 0.0
             for b in range(corners):
@@ -38,8 +38,8 @@ def cells_between(points, cells, size, centre, hollow, radius):  # type: ignore[
             square = 0.0
             for j in range(d):
                 square += (points[cells[e, b], j] - centre[j]) ** 2
-            farthest = max(farthest, square)
-        if math.sqrt(farthest) <= hollow:
+            farthest_square = max(farthest_square, square)
+        if math.sqrt(farthest_square) <= inner_radius:
             continue
         chosen[count] = e
         count += 1
@@ -59,13 +59,13 @@ def _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma):  # type: ignore[no
             for f in range(4):
                 g[m, i, 0] += modes[m, i, f] * root * (0.5 * value[f] * C - slope[f] * S)
                 g[m, i, 1] += modes[m, i, f] * root * (0.5 * value[f] * S + slope[f] * C)
-    radial = -C / (math.pi * r)
-    mean = (3.0 - kolosov) / 4.0 * radial
+    radial_stress = -C / (math.pi * r)
+    mean = (3.0 - kolosov) / 4.0 * radial_stress
     turn = (kolosov + 1.0) / (8.0 * mu * math.pi) * S / r
-    g[2, 0, 0] = (radial * C * C - mean) / (2.0 * mu)
-    g[2, 0, 1] = radial * C * S / (2.0 * mu) - turn
-    g[2, 1, 0] = radial * C * S / (2.0 * mu) + turn
-    g[2, 1, 1] = (radial * S * S - mean) / (2.0 * mu)
+    g[2, 0, 0] = (radial_stress * C * C - mean) / (2.0 * mu)
+    g[2, 0, 1] = radial_stress * C * S / (2.0 * mu) - turn
+    g[2, 1, 0] = radial_stress * C * S / (2.0 * mu) + turn
+    g[2, 1, 1] = (radial_stress * S * S - mean) / (2.0 * mu)
     for m in range(3):
         trace = lam * (g[m, 0, 0] + g[m, 1, 1])
         sigma[m, 0, 0] = trace + 2.0 * mu * g[m, 0, 0]
@@ -87,12 +87,12 @@ def _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend):  # type: ignore[no-unt
             v = a * c + b * s + e * c3 + d * s3
             v1 = 0.5 * (b * c - a * s) + 1.5 * (d * c3 - e * s3)
             v2 = -0.25 * (a * c + b * s) - 2.25 * (e * c3 + d * s3)
-            along = 0.5 * v * C - v1 * S
-            across = 0.5 * v * S + v1 * C
+            derivative_along = 0.5 * v * C - v1 * S
+            derivative_across = 0.5 * v * S + v1 * C
             slope_along = -0.5 * (v1 * C + v * S) - v2 * S
             slope_across = 0.5 * (v * C - v1 * S) + v2 * C
-            bend[m, i, 0] = -(0.5 * along * C + slope_along * S) / (root * r)
-            bend[m, i, 1] = -(0.5 * across * C + slope_across * S) / (root * r)
+            bend[m, i, 0] = -(0.5 * derivative_along * C + slope_along * S) / (root * r)
+            bend[m, i, 1] = -(0.5 * derivative_across * C + slope_across * S) / (root * r)
     square = r * r
     scale = 1.0 / (math.pi * square)
     stress_00 = scale * (-3.0 * x * x + 4.0 * x**4 / square) / square
@@ -120,7 +120,7 @@ def _into_frame(frame, tensor, turn, local):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _place(frame, dx, dy, side, behind):  # type: ignore[no-untyped-def]
+def _place(frame, dx, dy, side, is_behind):  # type: ignore[no-untyped-def]
     """Distance, coordinates, and cosine and sine of half the angle, without trigonometry."""
     r = math.sqrt(dx * dx + dy * dy)
     x = frame[0, 0] * dx + frame[0, 1] * dy
@@ -132,18 +132,18 @@ def _place(frame, dx, dy, side, behind):  # type: ignore[no-untyped-def]
     else:
         s = math.copysign(math.sqrt(0.5 * (1.0 - x / r)), y)
         c = 0.5 * y / (r * s)
-    if behind and side * s < 0.0:  # a lip that bends: the angle is continued by a turn
+    if is_behind and side * s < 0.0:  # a lip that bends: the angle is continued by a turn
         c, s = -c, -s
     return r, x, y, c, s
 
 
 @kernel
 def _add_point(  # type: ignore[no-untyped-def]
-    total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
+    total, local, dx, dy, side, is_behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
     sigma, fall,
 ):  # fmt: skip
     """Add what one point contributes; local: gradients in the frame, dx and dy from the tip."""
-    r, x, y, c, s = _place(frame, dx, dy, side, behind)
+    r, x, y, c, s = _place(frame, dx, dy, side, is_behind)
     _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
     for k in range(len(radii)):
         width = radii[k] - inner[k]
@@ -151,15 +151,21 @@ def _add_point(  # type: ignore[no-untyped-def]
         fall[k] = -30.0 * weight * (z * (1.0 - z)) ** 2 / (width * r)
     for state in range(local.shape[2]):
         a, b = local[0, 0, state], local[1, 0, state]
-        across = lam * a + (lam + 2.0 * mu) * local[1, 1, state]
+        stress_across = lam * a + (lam + 2.0 * mu) * local[1, 1, state]
         shear = mu * (local[0, 1, state] + b)
         for m in range(3):
             # P_11 and P_12 of P_kj t_k, t along the first axis.
             flux = x * (
-                sigma[m, 0, 0] * a + sigma[m, 1, 0] * b - shear * g[m, 0, 1] - across * g[m, 1, 1]
+                sigma[m, 0, 0] * a
+                + sigma[m, 1, 0] * b
+                - shear * g[m, 0, 1]
+                - stress_across * g[m, 1, 1]
             )
             flux += y * (
-                sigma[m, 0, 1] * a + sigma[m, 1, 1] * b + shear * g[m, 0, 0] + across * g[m, 1, 0]
+                sigma[m, 0, 1] * a
+                + sigma[m, 1, 1] * b
+                + shear * g[m, 0, 0]
+                + stress_across * g[m, 1, 0]
             )
             for k in range(len(radii)):
                 total[state, k, m] += fall[k] * flux
@@ -167,14 +173,14 @@ def _add_point(  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_change(  # type: ignore[no-untyped-def]
-    total, local, dx, dy, side, behind, weight, radii, inner, frame, modes, kolosov, mu, g, fall,
+    total, local, dx, dy, side, is_behind, weight, radii, inner, frame, modes, kolosov, mu, g, fall,
     change, bend,
 ):  # fmt: skip
     """Add what the change of the stiffness from that of the tip (3, 3) contributes at a point.
 
     After `_add_point`, whose unit gradients and slopes of the weight count.
     """
-    r, x, y, c, s = _place(frame, dx, dy, side, behind)
+    r, x, y, c, s = _place(frame, dx, dy, side, is_behind)
     _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend)
     for state in range(local.shape[2]):
         e0, e1 = local[0, 0, state], local[1, 1, state]
@@ -185,12 +191,12 @@ def _add_change(  # type: ignore[no-untyped-def]
         for m in range(3):
             flux = x * (s00 * g[m, 0, 0] + s01 * g[m, 1, 0])
             flux += y * (s01 * g[m, 0, 0] + s11 * g[m, 1, 0])
-            steady = s00 * bend[m, 0, 0] + s11 * bend[m, 1, 1]
-            steady += s01 * (bend[m, 0, 1] + bend[m, 1, 0])
+            stress_term = s00 * bend[m, 0, 0] + s11 * bend[m, 1, 1]
+            stress_term += s01 * (bend[m, 0, 1] + bend[m, 1, 0])
             for k in range(len(radii)):
                 z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
                 q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
-                total[state, k, m] += fall[k] * flux + weight * q * steady
+                total[state, k, m] += fall[k] * flux + weight * q * stress_term
 
 
 @kernel
@@ -297,7 +303,7 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
         smallest = 0.0
     for place in range(len(chosen)):
         e = chosen[place]
-        behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
+        is_behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
         for b in range(3):
             for i in range(2):
                 for s in range(states):
@@ -330,12 +336,12 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
                             + bary[p, 2] * corner[2, i, j, s]
                         )
             _add_point(
-                total, local, dx, dy, side[e], behind, share[p] * volume[e], radii, inner, frame,
+                total, local, dx, dy, side[e], is_behind, share[p] * volume[e], radii, inner, frame,
                 modes, kolosov, lam, mu, g, sigma, fall,
             )  # fmt: skip
             if change is not None:
                 _add_change(
-                    total, local, dx, dy, side[e], behind, share[p] * volume[e], radii, inner,
+                    total, local, dx, dy, side[e], is_behind, share[p] * volume[e], radii, inner,
                     frame, modes, kolosov, mu, g, fall,
                     change[place, min(p, change.shape[1] - 1)], bend,
                 )  # fmt: skip
