@@ -151,6 +151,15 @@ def test_a_step_with_fewer_arrays_than_it_had_is_damaged(whole):
     path.write_bytes(data)
 
 
+def test_a_member_whose_name_has_lost_its_ending_is_damage(whole):
+    path = run_files.step_path(whole.path, 2)
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"identity_end_count.npy", b"identity_end_count.nqy"))
+    with pytest.warns(XcrackWarning, match=r"step_00002\.npz"):
+        assert len(load(whole.path).steps) == 2
+    path.write_bytes(data)
+
+
 def test_what_cannot_be_stored_is_named(tmp_path):
     with pytest.raises(ProblemError, match=r"(Posix|Windows)Path cannot be stored"):
         store.packed_content({"path": tmp_path}, {})

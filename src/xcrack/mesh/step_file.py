@@ -15,7 +15,7 @@ import numpy as np
 from xcrack.base.arguments import Either, FileName, Function, Number, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import LARGEST, call_function, value_text, whole_numbers
-from xcrack.base.errors import GeometryError, MeshError
+from xcrack.base.errors import GeometryError, MeshError, XcrackError
 from xcrack.base.paths import system_errors
 from xcrack.base.units import LENGTH
 from xcrack.mesh.curved_facets import lattice, rows_of, with_curves
@@ -132,11 +132,17 @@ def _try(path: Path) -> None:
 
 def _shape(gmsh: ModuleType, path: Path) -> int:
     """Load the shape, make one conforming body of it, and return its dimension."""
-    occ = gmsh.model.occ
     try:
-        entities = occ.importShapes(str(path))
+        return _conforming_body(gmsh, path)
+    except XcrackError:
+        raise
     except Exception as error:  # gmsh has no other class
         raise GeometryError(f"gmsh cannot read {path.name} ({error}): export it anew.") from error
+
+
+def _conforming_body(gmsh: ModuleType, path: Path) -> int:
+    occ = gmsh.model.occ
+    entities = occ.importShapes(str(path))
     occ.synchronize()
     if not gmsh.model.getEntities(3):
         box = np.array(gmsh.model.getBoundingBox(-1, -1)) if entities else np.zeros(6)

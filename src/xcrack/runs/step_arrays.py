@@ -518,7 +518,10 @@ def read_arrays(data: bytes) -> Arrays | None:
             arrays = {name: members[name] for name in members.files}
         # Members have checksums, the directory of the file has none: a bit of it may hide some.
         count = arrays.pop(_COUNT, None)
-        return arrays if count is None or int(count) == len(arrays) else None
+        is_whole = count is None or int(count) == len(arrays)
+        # A member whose name has lost its ending is handed over as bytes.
+        is_whole &= all(isinstance(array, np.ndarray) for array in arrays.values())
+        return arrays if is_whole else None
     except Exception:  # whatever zipfile, zlib and numpy say of bytes that are not theirs
         return None
 
