@@ -18,13 +18,21 @@ from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.junctions import Junction
-from xcrack.mesh.distances import TriangleTree, first_crossing, signed_in, triangle_tree
+from xcrack.mesh.distances import (
+    TriangleTree,
+    closest_in,
+    first_crossing,
+    signed_in,
+    triangle_tree,
+)
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.triangulation import sides
 
 _LED = 2.2  # cells beyond it, to which a front that comes to its face is led
 _BESIDE = 1.0  # cells beyond their smallest distance, up to which a front is led on before another
+_STEEP = 0.5  # sine of the angle from which on an arm is led out as far as from the body
+_LEAST_SINE = 1e-2  # surfaces at less lie along each other
 _LEG = 3**-0.5  # leg of a cell over its longest edge
 
 
@@ -94,19 +102,37 @@ class BodyBefore(Body):
     ----------
     crack_trees : tuple of (TriangleTree, int)
         Those cracks, and the side of each that counts.
+    arm_tree : TriangleTree or None
+        The crack that ends on them.
     """
 
     crack_trees: tuple[tuple[TriangleTree, int], ...] = ()
+    arm_tree: TriangleTree | None = None
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
         """Distance to the boundary or to such a crack, negative inside, and the size there."""
         depth, size = super().depth(x)
         for tree, side in self.crack_trees:
-            is_beyond = -side * signed_in(tree, x)[0]
-            first = is_beyond > depth
-            depth = np.where(first, is_beyond, depth)
+            distance, face, _ = signed_in(tree, x)
+            depth_beyond = -side * distance
+            rows = np.nonzero(depth_beyond > 0)[0] if self.arm_tree is not None else []
+            if len(rows):
+                depth_beyond[rows] *= self._stretch(x[rows], tree.normal[face[rows]])
+            first = depth_beyond > depth
+            depth = np.where(first, depth_beyond, depth)
             size = np.where(first, self.cell_size(x), size)
         return depth, size
+
+    def _stretch(self, x: Floats, normal: Floats) -> Floats:
+        """By how much more an arm beyond a crack counts that comes to it at less than 30 degrees.
+
+        Its front is led out until it is some cells beyond: at a small angle that would be past the
+        front of the other one.
+        """
+        assert self.arm_tree is not None
+        own = self.arm_tree.normal[closest_in(self.arm_tree, x).triangle]
+        sine = np.linalg.norm(np.cross(own, normal), axis=1)
+        return np.asarray(np.maximum(_STEEP / np.maximum(sine, _LEAST_SINE), 1.0))
 
 
 def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
@@ -116,7 +142,8 @@ def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
     cracks_under = tuple(
         (triangle_tree(cracks[on].points, cracks[on].faces), side) for on, side in cracks[c].ends_on
     )
-    return BodyBefore(body.mesh, body.boundary, body.facet_size, cracks_under)
+    arm = triangle_tree(cracks[c].points, cracks[c].faces)
+    return BodyBefore(body.mesh, body.boundary, body.facet_size, cracks_under, arm)
 
 
 def _signed_distance(crack: Crack, x: Floats) -> Floats:

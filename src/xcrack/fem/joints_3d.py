@@ -17,7 +17,9 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cut_simplices
 
 _ROUND_OFF = 1e-13  # share of a cell below which a distance is zero
-_SINE = np.sin(np.radians(10.0))  # of the smallest angle between two cracks that meet
+_SINE = np.sin(np.radians(2.0))  # of the smallest angle between two cracks that meet
+_SHARP = np.sin(np.radians(10.0))  # below which one may be close to the other's front
+_CLEAR = 0.7  # of a cell, between that front and the arm: at less K of it is foreign
 
 
 def joined_cuts(
@@ -101,9 +103,27 @@ def _check(
         cell = int(cells[int(np.argmin(sine))])
         raise GeometryError(
             f"crack {c} meets crack {on} at {np.degrees(np.arcsin(sine.min())):.2g} degrees at "
-            f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}, or lies along it: below 10 degrees "
+            f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}, or lies along it: below 2 degrees "
             "they are not told apart. Leave out what lies along the other crack, or give both as "
             "one surface."
+        )
+    if sine.min() < _SHARP:
+        _check_clearance(mesh, through, ending, junction)
+
+
+def _check_clearance(mesh: Mesh, through: Cut, ending: Cut, junction: Junction) -> None:
+    """Raise where an arm at a small angle passes the front of the other crack too closely."""
+    cells = np.nonzero(through.is_tip)[0]
+    distance = np.abs(ending.level_set.phi[mesh.cells[cells]].mean(axis=1))
+    along = ending.level_set.inside[mesh.cells[cells]].mean(axis=1)
+    close = (distance < _CLEAR * mesh.cell_size[cells]) & (along < 0)
+    if close.any():
+        k = int(np.nonzero(close)[0][np.argmin(distance[close])])
+        raise CoarseMeshError(
+            f"crack {junction.crack} ends on crack {junction.on} at a small angle, and passes its "
+            f"front in {distance[k]:.2g} at {at(mesh.points[mesh.cells[cells[k]]].mean(axis=0))}, "
+            f"less than {_CLEAR:g} of a cell ({mesh.cell_size[cells[k]]:.2g}): refine the mesh "
+            f"there, or end crack {junction.on} before."
         )
 
 

@@ -450,7 +450,7 @@ def _domain_parts(
         near_points, feet = curve.points_near(x, outer)
         if not len(near_points):
             return None
-        counts = before_junctions(space, tip.crack, points.side[near_points])
+        counts = before_junctions(space, tip.crack, points.chosen(near_points))
         if not counts.all():
             near_points, feet = near_points[counts], feet.chosen(counts)
         points = points.chosen(near_points)

@@ -52,12 +52,17 @@ class Sides:
     is_smooth: Bools
 
 
-def before_junctions(space: FunctionSpace, crack: int, side: Ints) -> Bools:
-    """Which points do not lie beyond a crack on which this one ends, by their sides `(q,)`."""
-    result = np.ones(len(side), dtype=bool)
+def before_junctions(space: FunctionSpace, crack: int, points: Points) -> Bools:
+    """Which points do not lie beyond a crack on which this one ends `(q,)`.
+
+    Ahead of its fronts that one parts nothing.
+    """
+    result = np.ones(len(points.cell), dtype=bool)
     for joint in space.joints:
         if joint.crack == crack:
-            result &= side[:, joint.on] == joint.side
+            inside = space.cuts[joint.on].level_set.inside[space.mesh.cells[points.cell]]
+            is_ahead = np.einsum("qb,qb->q", inside, points.bary) > 0
+            result &= is_ahead | (points.side[:, joint.on] == joint.side)
     return result
 
 
@@ -111,7 +116,7 @@ def _boundary_around(
     near_points, feet = curve.points_near(position(space, points.cell, points.bary), reach)
     if not len(near_points):
         return None
-    counts = before_junctions(space, crack, points.side[near_points])
+    counts = before_junctions(space, crack, points.chosen(near_points))
     near_points, feet = near_points[counts], feet.chosen(counts)
     if not len(near_points):
         return None
@@ -143,8 +148,9 @@ def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: fl
         near_points, feet = curve.points_near(position(space, cell, bary), reach)
         cell, bary, weight = cell[near_points], bary[near_points], weight[near_points]
         sides = lip_side(space, joint.on, cell, bary, joint.side)
-        counts = before_junctions(space, crack, sides)
-        points = Points(cell, bary, weight, sides).chosen(counts)
+        points = Points(cell, bary, weight, sides)
+        counts = before_junctions(space, crack, points)
+        points = points.chosen(counts)
         normal = -joint.side * cut.lip_normal[rows][number[near_points]][counts]
         no_points = np.zeros(len(points.cell), dtype=bool)
         result.append(Sides(points, normal, feet.chosen(counts), no_points, no_points))
@@ -236,7 +242,7 @@ def integrals_of_sides(
         solutions, crack, curve, reach
     )
     for points, normal, feet, traction in loaded_parts:
-        counts = before_junctions(space, crack, points.side)
+        counts = before_junctions(space, crack, points)
         if not counts.all():
             points, normal, feet, traction = (
                 points.chosen(counts), normal[counts], feet.chosen(counts), traction[counts]
