@@ -252,3 +252,15 @@ def test_fronts_steeper_than_45_degrees_meet(seed, end):
     assert row["came to"] == end
     assert row["K is nan"] == 0
     assert row["unbalanced"] < 0.02
+
+
+@pytest.mark.parametrize("seed", [8, 17])
+def test_fronts_beside_each_other_pass(seed):
+    """Drawn pairs 1.3 cells beside each other: both go on until one comes out of the body.
+
+    Energy to half a percent (discretisation); of the steps behind the body's sides it is not asked.
+    """
+    row = drawn_pairs.growing_row(seed)
+    assert row["kind"].startswith("passed each other")
+    assert row["K is nan"] == 0
+    assert row["unbalanced"] < 0.005

@@ -180,8 +180,13 @@ def pair_row(seed):
     }
 
 
+def has_left(cracks):
+    """Whether a front, closed at first, has come out of the body."""
+    return any(front[0] != front[-1] for crack in cracks for front in crack.fronts or ())
+
+
 def growing_row(seed):
-    """The row of a pair that grows until it has met and one step more."""
+    """The row of a pair that grows until it has met and one step more, or comes out of the body."""
     begin = time.process_time()
     cracks = pair_to_grow(seed)
     mesh = xc.box((-1.25,) * 3, (1.25,) * 3, GROWING_CELLS)
@@ -193,7 +198,8 @@ def growing_row(seed):
             problem, xc.paris(C=1e-12, m=3.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=DA,
             max_steps=MOST_STEPS, progress=False,
         )  # fmt: skip
-        while met is None or len(steps) == met:
+        left = False
+        while not left and (met is None or len(steps) == met):
             try:
                 steps.append(next(run))
             except StopIteration as stop:
@@ -201,10 +207,13 @@ def growing_row(seed):
                 break
             if met is None and steps[-1].joins:
                 met = len(steps)
+            left = met is None and has_left(steps[-1].cracks)
     is_whole = ended.startswith("max_steps")
     if ended and met is None and not is_whole:
         raise GeometryError(ended.split(", N = ")[-1].partition(": ")[2] or ended)
     words = "met and gone on" if met is not None else f"not met in {MOST_STEPS} steps"
+    if left:
+        words = "passed each other by a cell or more, and came out of the body"
     if ended and not is_whole:
         words = f"met, then ended: {ended}"
     off = unbalanced(steps, E, NU)
