@@ -108,7 +108,7 @@ def _check(
             "one surface."
         )
     if sine.min() < _SHARP:
-        _check_clearance(mesh, through, ending, junction)
+        _check_clearance(mesh, through_cut, ending, junction)
 
 
 def _check_clearance(mesh: Mesh, through: Cut, ending: Cut, junction: Junction) -> None:
