@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arguments import Part, Whole, check_arguments
-from xcrack.base.arrays import Bools, Floats
+from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
@@ -115,7 +115,7 @@ class BodyBefore(Body):
         for tree, side in self.crack_trees:
             distance, face, _ = signed_in(tree, x)
             depth_beyond = -side * distance
-            rows = np.nonzero(depth_beyond > 0)[0] if self.arm_tree is not None else []
+            rows: Ints = np.nonzero((depth_beyond > 0) & (self.arm_tree is not None))[0]
             if len(rows):
                 depth_beyond[rows] *= self._stretch(x[rows], tree.normal[face[rows]])
             first = depth_beyond > depth
