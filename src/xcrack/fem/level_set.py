@@ -462,9 +462,13 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
     tree : TriangleTree
         The surface and its prolongation.
     """
+    shift = np.zeros(mesh.n_points)
     values = phi[mesh.cells]
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0) & ~at_end[mesh.cells].any(axis=1)
     cells = np.nonzero(cut)[0]
+    height = (tree.corners - tree.corners[0, 0]) @ tree.normal[0]
+    if np.ptp(height) < _STRAIGHT * mesh.cell_size[cells].min(initial=np.inf):
+        return shift  # a plane: phi is linear
     bary, weight = simplex_rule(3, 2)
     x = np.einsum("pv,cvd->cpd", bary, mesh.points[mesh.cells[cells]]).reshape(-1, 3)
     distances = signed_in(tree, x)
@@ -473,7 +477,6 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
     size = mesh.cell_size[cells]
     of_crack = (np.abs(error).max(axis=1) < _NO_CUT * size) & ~is_beyond.any(axis=1)
     cells, error, size = cells[of_crack], error[of_crack], size[of_crack]
-    shift = np.zeros(mesh.n_points)
     if np.abs(error).max(initial=0.0) < _STRAIGHT * size.min(initial=np.inf):
         return shift
     nodes, volume = mesh.cells[cells], mesh.volume[cells]

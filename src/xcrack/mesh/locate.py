@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.mesh.distances import TriangleTree, signed_in, triangle_tree
+from xcrack.mesh.distances import TriangleTree, signed_in
 from xcrack.mesh.mesh import Mesh
 
 _CROSSINGS = 1_000_000  # pairs of a piece and a boundary facet that are looked at at once
@@ -150,18 +150,7 @@ class Body:
     @staticmethod
     def of(mesh: Mesh) -> "Body":
         """The body that a mesh fills."""
-        place = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-        cell = mesh.facet_to_cell[place, 0]
-        facets = mesh.facets[place]
-        corner = mesh.points[facets]
-        # Barycentric coordinates decrease towards the facet opposite to their corner.
-        local = np.argmax(mesh.cell_to_facet[cell] == place[:, None], axis=1)
-        inward_normal = mesh.gradient[cell, local]
-        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        is_turned = np.einsum("ij,ij->i", normal, inward_normal) > 0
-        facets = np.where(is_turned[:, None], facets[:, ::-1], facets)
-        size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-        return Body(mesh, triangle_tree(mesh.points, facets), size)
+        return Body(mesh, *mesh.boundary_tree)
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
         """Distance to the boundary, negative inside, and the size of the facet there."""

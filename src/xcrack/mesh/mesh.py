@@ -16,6 +16,7 @@ from xcrack.base.checks import call_function, value_text, whole_numbers
 from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.mesh.checks import checked_cells, checked_sets, mesh_doubts, unused_sets
 from xcrack.mesh.curves import Curves, check_on_curves, checked_curves
+from xcrack.mesh.distances import TriangleTree, triangle_tree
 
 _CELLS = {2: "triangles", 3: "tetrahedra"}
 
@@ -297,6 +298,22 @@ class Mesh:
         edge = (np.prod(side / side.max()) / bins) ** (1 / self.dim) * side.max()
         shape = np.clip(side / edge, 1, len(self.cells)).astype(np.int64)
         return cells_in_bins(self.points, self.cells, every, shape), shape
+
+    @cached_property
+    def boundary_tree(self) -> tuple[TriangleTree, Floats]:
+        """In 3D: search tree of the boundary, its normals outward, and the size of its facets."""
+        place = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
+        cell = self.facet_to_cell[place, 0]
+        facets = self.facets[place]
+        corner = self.points[facets]
+        # Barycentric coordinates decrease towards the facet opposite to their corner.
+        local = np.argmax(self.cell_to_facet[cell] == place[:, None], axis=1)
+        inward_normal = self.gradient[cell, local]
+        normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        is_turned = np.einsum("ij,ij->i", normal, inward_normal) > 0
+        facets = np.where(is_turned[:, None], facets[:, ::-1], facets)
+        size = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+        return triangle_tree(self.points, facets), lock(size)
 
     def facet_numbers(self, facets: Ints) -> Ints:
         """Numbers (rows of `facets`) of the given facets `(k, d)`; -1 where there is none.
