@@ -336,12 +336,12 @@ def solved(problem: xc.Problem) -> tuple[xc.SIF, Row]:
         solution = xc.solve(problem)
         sif = xc.stress_intensity(solution)
         seconds = time.process_time() - begin
-    said = [str(w.message) for w in issued if issubclass(w.category, xc.XcrackWarning)]
+    texts = [str(w.message) for w in issued if issubclass(w.category, xc.XcrackWarning)]
     mesh, crack = problem.mesh, problem.placed[0]
     x = crack.points[np.concatenate(crack.fronts)]
     size = float(np.median(leg_sizes(mesh, mesh.cell_tree.query(x)[1])))
     return sif, {
-        "unknowns": solution.n_dof, "seconds": round(seconds, 2), "leg": size, "warnings": said,
+        "unknowns": solution.n_dof, "seconds": round(seconds, 2), "leg": size, "warnings": texts,
     }  # fmt: skip
 
 
@@ -375,14 +375,14 @@ def outcome(seed: int, target: int, path: Path) -> None:
     row = stored.setdefault(str(seed), {"kind": scene.kind})
     if scene.exact is None and "truth" not in row:
         sif, took = solved(sized(scene, TRUTH)[0])
-        order = np.argsort(share_along(sif))
+        along = np.argsort(share_along(sif))
         row["truth"] = {
-            "s": share_along(sif)[order].round(5).tolist(), "K": sif.K[order].round(4).tolist(),
+            "s": share_along(sif)[along].round(5).tolist(), "K": sif.K[along].round(4).tolist(),
             **took,
         }  # fmt: skip
         write(path, stored)
-    known = [(int(n), row[n]["h"]) for n in row if n.isdigit()]
-    guess = known[-1][1] * (known[-1][0] / target) ** 0.45 if known else None
+    earlier = [(int(n), row[n]["h"]) for n in row if n.isdigit()]
+    guess = earlier[-1][1] * (earlier[-1][0] / target) ** 0.45 if earlier else None
     problem, h = sized(scene, target, guess)
     both: Row = {"h": h}
     for order in (2, 1) if target < SIZES[-1] else (2,):

@@ -177,7 +177,8 @@ def state(*sifs, pressed=(), beside=None):
     best, bar = values([sifs], [0], beside or (0.0,) * len(sifs))
     return SimpleNamespace(
         sifs=[sifs], solutions=[SimpleNamespace(at_rest=False)], K=best, bar=bar,
-        pressed=pressed, surface_depths=beside or (0.0,) * len(sifs), scale=np.abs(best).max(),
+        pressed_cracks=pressed, surface_depths=beside or (0.0,) * len(sifs),
+        scale=np.abs(best).max(),
     )  # fmt: skip
 
 

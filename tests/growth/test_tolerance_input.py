@@ -86,7 +86,7 @@ def test_nothing_is_lost_where_a_later_mesh_cannot_be_made(tmp_path, monkeypatch
     def fails(*args):
         raise xc.MeshError("curves['hole'] takes the point elsewhere")
 
-    monkeypatch.setattr(mesh_cells, "finer", fails)
+    monkeypatch.setattr(mesh_cells, "refine_cells", fails)
     monkeypatch.setattr(mesh_cells, "_WHOLE", 0.3)
     mesh = xc.box((0.0, -1.0), (1.0, 1.0), (5, 10))
     pull = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]

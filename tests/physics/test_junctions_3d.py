@@ -185,7 +185,7 @@ def test_a_closed_join_below_ten_degrees():
 @pytest.mark.slow
 def test_an_arm_too_close_to_the_front_that_it_passes_is_refused():
     """At half a cell K of that front would be foreign, and the energy 8 % off."""
-    with pytest.raises(xc.XcrackError, match=r"passes its front in .* refine the mesh"):
+    with pytest.raises(xc.XcrackError, match=r"passes its front at .* refine the mesh"):
         slice_at_a_small_angle(3.0, 33, contact="off")
 
 

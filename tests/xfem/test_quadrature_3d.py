@@ -266,8 +266,8 @@ def test_points_away_from_a_front(order, count):
     corner = np.broadcast_to(np.eye(4), (len(cells), 4, 4))
     far = radius_at(space, mesh.cells[cells], corner).min(axis=1) > mesh.cell_size[cells]
     assert far.sum() > 20
-    whole, fan = np.ones(far.sum()), np.zeros(far.sum(), dtype=bool)
-    number, _, weight = front_points(space, cells[far], corner[far], whole, fan, 4)
+    whole = np.ones(far.sum())
+    number, _, weight = front_points(space, cells[far], corner[far], whole, 4)
     np.testing.assert_array_equal(np.bincount(number), count)
     np.testing.assert_allclose(np.bincount(number, weight), 1, rtol=1e-14)  # round-off
 

@@ -130,8 +130,8 @@ class BodyBefore(Body):
         front of the other one.
         """
         assert self.arm_tree is not None
-        own = self.arm_tree.normal[closest_in(self.arm_tree, x).triangle]
-        sine = np.linalg.norm(np.cross(own, normal), axis=1)
+        arm_normal = self.arm_tree.normal[closest_in(self.arm_tree, x).triangle]
+        sine = np.linalg.norm(np.cross(arm_normal, normal), axis=1)
         return np.asarray(np.maximum(_STEEP / np.maximum(sine, _LEAST_SINE), 1.0))
 
 

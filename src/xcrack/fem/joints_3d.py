@@ -111,19 +111,20 @@ def _check(
         _check_clearance(mesh, through_cut, ending, junction)
 
 
-def _check_clearance(mesh: Mesh, through: Cut, ending: Cut, junction: Junction) -> None:
+def _check_clearance(mesh: Mesh, through_cut: Cut, ending: Cut, junction: Junction) -> None:
     """Raise where an arm at a small angle passes the front of the other crack too closely."""
-    cells = np.nonzero(through.is_tip)[0]
+    cells = np.nonzero(through_cut.is_tip)[0]
     distance = np.abs(ending.level_set.phi[mesh.cells[cells]].mean(axis=1))
     along = ending.level_set.inside[mesh.cells[cells]].mean(axis=1)
     close = (distance < _CLEAR * mesh.cell_size[cells]) & (along < 0)
     if close.any():
         k = int(np.nonzero(close)[0][np.argmin(distance[close])])
+        middle = mesh.points[mesh.cells[cells[k]]].mean(axis=0)
         raise CoarseMeshError(
             f"crack {junction.crack} ends on crack {junction.on} at a small angle, and passes its "
-            f"front in {distance[k]:.2g} at {at(mesh.points[mesh.cells[cells[k]]].mean(axis=0))}, "
-            f"less than {_CLEAR:g} of a cell ({mesh.cell_size[cells[k]]:.2g}): refine the mesh "
-            f"there, or end crack {junction.on} before."
+            f"front at a distance of {distance[k]:.2g} at {at(middle)}, less than {_CLEAR:g} of a "
+            f"cell ({mesh.cell_size[cells[k]]:.2g}): refine the mesh there, or "
+            f"end crack {junction.on} before."
         )
 
 

@@ -64,7 +64,7 @@ from xcrack.growth.step import (
 )
 from xcrack.growth.uncertainty import add_K_error, best_K, foretold_bars, shortfall
 from xcrack.linalg.engine import SolverState
-from xcrack.model.problem import Problem
+from xcrack.model.problem import Problem, problem_with_cracks
 from xcrack.sif.sif import SIF
 
 
@@ -514,7 +514,7 @@ def _step_after(
 
 def _scene(rule: GrowthRule, last: Step) -> Problem:
     """The scene after the plan of a step, with the radius of the first."""
-    problem = rule.problem.with_cracks(plan_of(last).cracks, run_state(last).radius)
+    problem = problem_with_cracks(rule.problem, plan_of(last).cracks, run_state(last).radius)
     _ = problem.placed  # an error here ends a run
     return problem
 

@@ -314,24 +314,6 @@ class Problem(Declared):
         """In 2D: where cracks end on others."""
         return junctions(self.placed, self.mesh)
 
-    def with_cracks(self, cracks: Sequence[Crack], radius: float | None = None) -> "Problem":
-        """The same scene with cracks that have grown; while these are as many, no more is checked.
-
-        Parameters
-        ----------
-        cracks : sequence of Crack
-        radius : float, length, optional
-            Of the tip functions, in place of that of `numerics`.
-        """
-        numerics = self.numerics
-        if radius is not None and radius != numerics.radius:
-            numerics = sound_copy(numerics, radius=radius)
-        if len(cracks) != len(self.cracks):
-            return replace(self, cracks=tuple(cracks), numerics=numerics)
-        result = sound_copy(self, cracks=tuple(cracks), numerics=numerics)
-        vars(result)["elasticity"] = self.elasticity
-        return result
-
     @property
     def frictions(self) -> tuple[float, ...]:
         """Coefficient of friction of each crack."""
@@ -441,6 +423,28 @@ class Problem(Declared):
 ProblemArgument = Annotated[Problem, Part(Problem, "a Problem(mesh, material, ...)")]
 
 
+def problem_with_cracks(
+    problem: Problem, cracks: Sequence[Crack], radius: float | None = None
+) -> Problem:
+    """The same scene with cracks that have grown; while these are as many, no more is checked.
+
+    Parameters
+    ----------
+    problem : Problem
+    cracks : sequence of Crack
+    radius : float, length, optional
+        Of the tip functions, in place of that of `numerics`.
+    """
+    numerics = problem.numerics
+    if radius is not None and radius != numerics.radius:
+        numerics = sound_copy(numerics, radius=radius)
+    if len(cracks) != len(problem.cracks):
+        return replace(problem, cracks=tuple(cracks), numerics=numerics)
+    result = sound_copy(problem, cracks=tuple(cracks), numerics=numerics)
+    vars(result)["elasticity"] = problem.elasticity
+    return result
+
+
 def check_problem(problem: Any, what: str) -> None:
     """Raise where a function that needs a problem was given something else."""
     if not isinstance(problem, Problem):
@@ -473,5 +477,6 @@ __all__ = [
     "check_order",
     "fitted_friction",
     "friction_coefficients",
+    "problem_with_cracks",
     "scaled_state",
 ]

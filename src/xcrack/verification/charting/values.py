@@ -116,7 +116,8 @@ def at_places(sample: Sampled, places: Sampled) -> Floats:
     if not np.array_equal(groups, place_groups):
         raise ProblemError(
             f"{len(groups)} tip(s) or front(s) here, {len(place_groups)} in the reference: "
-            "another crack. An end within half a cell of the boundary is a mouth; take finer ones."
+            "another crack. An end within half a cell of the boundary is a mouth; take finer "
+            "meshes."
         )
     inner = ~np.asarray(places.at_surface)
     inner = inner if inner.any() else np.ones_like(inner)
