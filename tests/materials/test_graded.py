@@ -37,12 +37,13 @@ def test_an_edge_crack_in_a_graded_plate_on_a_finer_mesh(ratio, a, K):
 
 @pytest.mark.slow
 def test_bars_hold_in_graded_plates():
-    hold = []
+    """The table is good to 3e-5: all of 80 cells across, with bars of 3e-6, is that above it."""
+    hold, table_error = [], 3e-5
     for ratio, a, K in scenes.GRADED:
         for n in (10, 14, 20, 28):
             sif = xc.stress_intensity(xc.solve(scenes.graded_plate(n, ratio, a)), error=True)
             if np.isfinite(sif.bar[0, 0]):
-                hold.append(abs(sif.best[0, 0] - K) <= sif.bar[0, 0])
+                hold.append(abs(sif.best[0, 0] - K) <= sif.bar[0, 0] + table_error * K)
     print(f"{len(hold)} bars: {np.mean(hold):.3f} hold")
     assert len(hold) > 40
     assert np.mean(hold) >= 0.93
