@@ -90,6 +90,8 @@ def benthem_koiter(ratio):
 
 
 # %% Solve on each mesh, all three states in one call
+# Under shear the errors of coarse meshes press a few places of the front together.
+warnings.filterwarnings("ignore", ".*contact zone", xc.XcrackWarning)
 # The crack lies between layers of points, off the middle of the cells.
 CRACK = xc.penny_crack((0.013 * A, -0.021 * A, 0.0317 * A), (0, 0, 1), A)
 K_0 = np.array([2 * TENSION, 4 / (2 - NU) * SHEAR, 4 * (1 - NU) / (2 - NU) * SHEAR]) * UNIT

@@ -219,7 +219,7 @@ def test_fine_cells_follow_the_tip(tmp_path, monkeypatch):
     first = mesh_cells.begin(rule).problem.mesh
     for step, mesh in zip(whole.steps, meshes, strict=True):
         cells, tip = step.run.cells, step.cracks[0].points[-1:]
-        again = mesh_cells.bisected(first, cells)
+        again = mesh_cells.bisect_mesh(first, cells)
         assert again.points.tobytes() == mesh.points.tobytes()
         assert again.cells.tobytes() == mesh.cells.tobytes()
         assert cell_sizes(mesh, tip)[0] <= 1.25 * cells.size_at(tip)[0]

@@ -233,7 +233,7 @@ _BRANCH, _KINK_ROOM = 1.5, 1.0
 _LEG = 1.0  # cells; a shorter piece between kinks, or to a tip, is rounded off
 # Of the shares of cells where an interface meets a side or the crack, which are singular too.
 _AT_INTERFACES = 0.8
-_BESIDE = 1.0  # by how much bars grow a cell away from another material, less farther away
+_BESIDE = 2.2  # by how much bars grow a cell away from another material, less farther away
 
 
 def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
