@@ -1,6 +1,6 @@
 """Lives and paths to a wanted error: the true error beside the bar, and the cost.
 
-``python -m benchmarks.wanted_error`` prints the table of docs/measured.md and stores it in
+``python -m benchmarks.wanted_error`` prints the table of docs/measured.md, draws its figure and stores it in
 ``benchmarks/results/wanted_error.json``. Truth is a run with a tolerance of 5e-4 in steps of 0.03.
 Beside each tolerance runs the cheapest fixed setting that reaches it, as found among uniform meshes
 1 to 3 times as fine and steps of 0.3 to 0.035 by someone who knew the truth.
@@ -20,6 +20,7 @@ import xcrack as xc
 from xcrack.base.arrays import Floats
 
 RESULT = Path(__file__).parent / "results" / "wanted_error.json"
+FIGURE = Path(__file__).parents[1] / "docs" / "figures" / "wanted_error_cost.png"
 LAW = xc.paris(C=1e-3, m=3.0)
 STEEL = xc.Isotropic(210e3, 0.3, plane="strain")
 UP = (xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0)))
@@ -141,8 +142,29 @@ def measured(name: str) -> list[dict[str, Any]]:
     return rows
 
 
+def draw(rows: list[dict[str, Any]]) -> None:
+    """Cost of a tolerance over the tolerance: each scene, and the cheapest fixed settings."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(6.4, 4.2))
+    for name in dict.fromkeys(row["scene"] for row in rows):
+        of_scene = [row for row in rows if row["scene"] == name]
+        (line,) = axes.plot(
+            [row["tolerance"] for row in of_scene], [row["seconds"] for row in of_scene], "o-",
+            label=name,
+        )  # fmt: skip
+        fixed = [(row["tolerance"], row["fixed"]) for row in of_scene if row["fixed"] is not None]
+        axes.plot(*zip(*fixed, strict=True), "x:", color=line.get_color())
+    axes.set(xscale="log", yscale="log", xlabel="tolerance", ylabel="processor time (s)")
+    axes.set_title("tolerance (dots), cheapest fixed setting (crosses)", fontsize="medium")
+    axes.set_xticks(TOLERANCES, [f"{100 * t:g} %" for t in TOLERANCES])
+    axes.set_xticks([], minor=True)
+    axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1, 1))
+    figure.savefig(FIGURE, dpi=120, bbox_inches="tight")
+
+
 def main() -> None:
-    """Print and store the table."""
+    """Print and store the table, and draw the cost."""
     run(*scene(SCENES[0]), tolerance=0.1)  # kernels are compiled
     rows = []
     for name in SCENES:
@@ -155,6 +177,7 @@ def main() -> None:
                 flush=True,
             )
     RESULT.write_text(json.dumps(rows, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    draw(rows)
 
 
 if __name__ == "__main__":
