@@ -1,7 +1,8 @@
 """Lives and paths to a wanted error: the true error beside the bar, and the cost.
 
-``python -m benchmarks.wanted_error`` prints the table of docs/measured.md, draws its figure and stores it in
-``benchmarks/results/wanted_error.json``. Truth is a run with a tolerance of 5e-4 in steps of 0.03.
+``python -m benchmarks.wanted_error`` prints the table of docs/measured.md, draws its figure and
+stores it in ``benchmarks/results/wanted_error.json``. Truth is a run with a tolerance of 5e-4 in
+steps of 0.03.
 Beside each tolerance runs the cheapest fixed setting that reaches it, as found among uniform meshes
 1 to 3 times as fine and steps of 0.3 to 0.035 by someone who knew the truth.
 """
