@@ -160,6 +160,19 @@ def test_a_member_whose_name_has_lost_its_ending_is_damage(whole):
     path.write_bytes(data)
 
 
+def test_a_member_that_holds_no_array_is_damage(whole):
+    path = run_files.step_path(whole.path, 2)
+    data = path.read_bytes()
+    with zipfile.ZipFile(io.BytesIO(data)) as members:
+        content_of = {name: members.read(name) for name in members.namelist()}
+    with zipfile.ZipFile(path, "w") as members:
+        for name, text in (content_of | {"identity_end_count.npy": b"no array"}).items():
+            members.writestr(name, text)
+    with pytest.warns(XcrackWarning, match=r"step_00002\.npz"):
+        assert len(load(whole.path).steps) == 2
+    path.write_bytes(data)
+
+
 def test_what_cannot_be_stored_is_named(tmp_path):
     with pytest.raises(ProblemError, match=r"(Posix|Windows)Path cannot be stored"):
         store.packed_content({"path": tmp_path}, {})
