@@ -119,7 +119,7 @@ def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
     """Solutions of a scene at order 2, K and its errors; of fronts no shares."""
     is_plane = problem.mesh.dim < 3
     solutions = solve_states(problem, states, error=is_plane)
-    if any(each is not None and each.shear is not None for each in solutions[0].contact):
+    if solutions[0].has_friction:
         raise ProblemError(
             "adapt: crack faces press and rub, and K with friction has no error bars: adapt the "
             "mesh with friction=0, and compare two meshes with friction."

@@ -11,7 +11,7 @@ from xcrack.base.errors import ProblemError, SizeError
 from xcrack.base.machine import free_memory
 from xcrack.base.markup import element
 from xcrack.crack.crack import Crack, crack_length
-from xcrack.crack.measures import area_inside, cells_deep, front_length_inside
+from xcrack.crack.measures import DEEP, area_inside, cells_deep, front_length_inside
 from xcrack.crack.stations import short_fronts
 from xcrack.fem.enrichment import reach_of_tips
 from xcrack.mesh.locate import Body
@@ -424,7 +424,7 @@ def _order(problem: Problem) -> list[Ingredient]:
     if not depth_in_cells:
         return []
     depths = ", ".join(f"crack {c}: {value:.2g} cells deep" for c, value in depth_in_cells.items())
-    reason = f"{depths}; K is 1 to 5 % too low below five cells, order=2 within 0.5 %"
+    reason = f"{depths}; K is 1 to 5 % too low below {DEEP:g} cells, order=2 within 0.5 %"
     return [Ingredient("order 1", True, reason)]
 
 

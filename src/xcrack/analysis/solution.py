@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
+from operator import itemgetter
 from typing import Annotated, Any
 
 import numpy as np
@@ -179,9 +180,15 @@ class Solution:
 
         Faces that rub may hold slip without any load.
         """
-        has_friction = any(each is not None and each.shear is not None for each in self.contact)
-        has_load = self.factor or any(factor for _, factor in self.acting)
-        return not has_load and not has_friction
+        return not (self.factor or any(map(itemgetter(1), self.acting)) or self.has_friction)
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether crack faces rub where they press."""
+        for contact in self.contact:
+            if contact is not None and contact.shear is not None:
+                return True
+        return False
 
     @property
     def n_dof(self) -> int:

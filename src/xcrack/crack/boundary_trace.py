@@ -210,10 +210,10 @@ def under_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body) 
     result = np.zeros(len(outline.loop), dtype=bool)
     x = points[outline.loop]
     middle = (x + np.roll(x, -1, axis=0)) / 2
-    outward, _ = _outward_directions(points, faces, outline.loop)
     for run in runs_of(~outline.is_inside):
         if len(run) < len(x) and outline.candidate[run].all():
-            place_ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward[run]
+            outward = _outward_directions(points, faces, outline.loop)[0][run]
+            place_ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward
             depth = body.depth(np.concatenate([middle[run], place_ahead]))[0]
             result[run] = (depth < 0).all()
     return result

@@ -110,13 +110,8 @@ class Crack:
         along = x - begin
         (ahead, up), (back, down) = frame.transpose(1, 2, 0)
         length, direction = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
-        return (
-            x,
-            lock(begin),
-            lock(length),
-            lock(direction),
-            lock(np.sign(ahead * down - up * back)),
-        )
+        hand = np.sign(ahead * down - up * back)
+        return x, lock(begin), lock(length), lock(direction), lock(hand)
 
     def __repr__(self) -> str:
         ends = "not placed"

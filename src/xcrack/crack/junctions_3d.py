@@ -6,13 +6,14 @@ counts. Of two surfaces that cross one runs through, and the other is two arms.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arguments import Part, Whole, check_arguments
-from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
@@ -102,12 +103,16 @@ class BodyBefore(Body):
     ----------
     crack_trees : tuple of (TriangleTree, int)
         Those cracks, and the side of each that counts.
-    arm_tree : TriangleTree or None
+    arm : Crack
         The crack that ends on them.
     """
 
-    crack_trees: tuple[tuple[TriangleTree, int], ...] = ()
-    arm_tree: TriangleTree | None = None
+    crack_trees: tuple[tuple[TriangleTree, int], ...]
+    arm: Crack
+
+    @cached_property
+    def _arm_tree(self) -> TriangleTree:
+        return triangle_tree(self.arm.points, self.arm.faces)
 
     def depth(self, x: Floats) -> tuple[Floats, Floats]:
         """Distance to the boundary or to such a crack, negative inside, and the size there."""
@@ -115,7 +120,7 @@ class BodyBefore(Body):
         for tree, side in self.crack_trees:
             distance, face, _ = signed_in(tree, x)
             depth_beyond = -side * distance
-            rows: Ints = np.nonzero((depth_beyond > 0) & (self.arm_tree is not None))[0]
+            rows = np.nonzero(depth_beyond > 0)[0]
             if len(rows):
                 depth_beyond[rows] *= self._stretch(x[rows], tree.normal[face[rows]])
             first = depth_beyond > depth
@@ -129,8 +134,7 @@ class BodyBefore(Body):
         Its front is led out until it is some cells beyond: at a small angle that would be past the
         front of the other one.
         """
-        assert self.arm_tree is not None
-        arm_normal = self.arm_tree.normal[closest_in(self.arm_tree, x).triangle]
+        arm_normal = self._arm_tree.normal[closest_in(self._arm_tree, x).triangle]
         sine = np.linalg.norm(np.cross(arm_normal, normal), axis=1)
         return np.asarray(np.maximum(_STEEP / np.maximum(sine, _LEAST_SINE), 1.0))
 
@@ -142,8 +146,7 @@ def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
     cracks_under = tuple(
         (triangle_tree(cracks[on].points, cracks[on].faces), side) for on, side in cracks[c].ends_on
     )
-    arm = triangle_tree(cracks[c].points, cracks[c].faces)
-    return BodyBefore(body.mesh, body.boundary, body.facet_size, cracks_under, arm)
+    return BodyBefore(body.mesh, body.boundary, body.facet_size, cracks_under, cracks[c])
 
 
 def _signed_distance(crack: Crack, x: Floats) -> Floats:

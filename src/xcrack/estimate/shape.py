@@ -164,13 +164,13 @@ def gap_changes(
             rows = np.nonzero(np.asarray(contact.closed) & (np.asarray(contact.pressure) > 0))[0]
             if not len(rows):
                 continue
+            columns = _columns([solution], estimated.z[[k]])
             lips = solution.lips[other]
             cell, x = lips.cell[rows, 0], lips.x[rows]
             size = space.mesh.cell_size[cell]
             gap = np.zeros((len(rows), 1 + m))
             for s, sign in ((0, -1), (1, 1)):
                 side = lip_side(space, other, lips.cell[rows, s], lips.bary[rows, s], sign)
-                columns = _columns([solution], estimated.z[[k]])
                 u, _ = fields_at(space, columns, lips.cell[rows, s], lips.bary[rows, s], side)
                 if other == c:
                     u[..., 1:] -= singular()[0][s, rows]

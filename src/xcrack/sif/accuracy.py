@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import ProblemError, warn
-from xcrack.crack.measures import cells_deep
+from xcrack.crack.measures import DEEP, cells_deep
 from xcrack.sif.common import is_shallow, pressure_at
 from xcrack.sif.sif import SIF
 
@@ -186,11 +186,6 @@ def warn_of(
         )
     if text:
         warn(". ".join([text, *(message.rstrip(".") for message in messages)]) + ".")
-
-
-# Cells by which a crack must be deep at order 1 in 3D: K is up to 4.7 % low below, within 2 % above
-# (17 edge, surface, corner cracks and pennies, on even meshes and on graded ones).
-DEEP = 5.0
 
 
 def warn_of_order(solution: Solution, crack: int) -> None:

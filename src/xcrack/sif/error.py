@@ -295,7 +295,7 @@ def _refusal_of_solution(solution: Solution, crack: int) -> str:
     method = problem.numerics.contact_method
     if solution.contact[crack] is not None and method is not None:
         return f"contact by {method.label} has no estimate"
-    if any(contact is not None and contact.shear is not None for contact in solution.contact):
+    if solution.has_friction:
         return "friction has no estimate"
     materials = problem.elasticity.materials
     if len(materials) > 1:
@@ -545,7 +545,9 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
         replace(solutions[0].problem, order=2), [s.state for s in solutions]
     )
     reason = "order 2 has other fronts than order 1: refine the mesh along them"
-    return bars_beside(sifs, _sifs_of_fronts(finer_solutions, crack), reason, _rubs(solutions))
+    return bars_beside(
+        sifs, _sifs_of_fronts(finer_solutions, crack), reason, solutions[0].has_friction
+    )
 
 
 def _sifs_of_fronts(solutions: Sequence[Solution], crack: int) -> list[SIF]:
@@ -566,12 +568,7 @@ def without_estimate(solutions: Sequence[Solution], sifs: Sequence[SIF]) -> list
 
 def _is_whole_path(solutions: Sequence[Solution]) -> bool:
     """Whether these states can be solved again: with friction all that a solve began with."""
-    return not _rubs(solutions) or [s.number for s in solutions] == list(range(len(solutions)))
-
-
-def _rubs(solutions: Sequence[Solution]) -> bool:
-    """Whether faces rub where they press."""
-    return any(c is not None and c.shear is not None for c in solutions[0].contact)
+    return not solutions[0].has_friction or all(s.number == k for k, s in enumerate(solutions))
 
 
 def bars_beside(

@@ -119,7 +119,7 @@ def bars_by_finer_cells(
     second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer_solutions_))]
     of_second = estimate(finer_solutions_, second, crack)
     cells = None
-    if any(c is not None and c.shear is not None for c in finer_solutions_[0].contact):
+    if finer_solutions_[0].has_friction:
         length = float(finer_solutions_[0].lips[crack].weight.sum())
         cells = np.array([domain_of(finer_solutions_[0], t).size for t in tips]) / length
     every = zip(sifs, second, of_second, strict=True)
@@ -146,7 +146,7 @@ def _half_widths_of_friction(second: SIF, change: Floats, cells: Floats) -> Floa
 
 def _from_second(sif: SIF, second: SIF, of_second: KErrors, cells: Floats | None) -> KErrors:
     """Bars of one state from the second solution; with friction by its cells per length."""
-    reasons_that_stay = [reason if not has_help(reason) else "" for reason in of_second.reasons]
+    reasons_that_stay = ["" if has_help(reason) else reason for reason in of_second.reasons]
     is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
     best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
     eta = best - sif.K
