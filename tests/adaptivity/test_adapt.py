@@ -11,9 +11,6 @@ import pytest
 import xcrack as xc
 from support import exact
 from support import scenes_2d as scenes
-from xcrack.adaptivity import sizes_3d
-from xcrack.adaptivity.adapt import _MOST_ROUNDS
-from xcrack.adaptivity.sizes_2d import size_ratios
 from xcrack.verification import methods
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
@@ -169,18 +166,6 @@ def penny(radius=0.15):
     return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=pull, contact="off")
 
 
-def test_the_first_mesh_in_3d_is_fine_along_the_front():
-    problem = penny()
-    mesh = sizes_3d.first_mesh(problem)
-    angle = np.linspace(0, 2 * np.pi, 50)
-    front = np.stack([0.15 * np.cos(angle), 0.15 * np.sin(angle), 0 * angle], 1)
-    front += (0.01, 0.02, 0.013)
-    at = mesh.cell_tree.query(front)[1]
-    assert mesh.cell_size[at].max() <= 0.15 / 2.5 * 1.01
-    assert mesh.cell_size.max() > 4 * mesh.cell_size[at].max()
-    assert len(mesh.cells) < 60_000
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-3])
 def test_penny(tolerance):
@@ -223,7 +208,7 @@ def test_a_crack_that_carries_nothing_is_named():
     problem = xc.Problem(xc.box((-1, -1), (1, 1), 6), STEEL, [crack], loads=push, contact="off")
     adapted = xc.adapt(problem, 1e-2, max_unknowns=20_000, progress=False)
     assert not adapted.met
-    assert len(adapted.rounds) <= _MOST_ROUNDS[2]
+    assert len(adapted.rounds) <= 14
 
 
 @pytest.mark.parametrize("tolerance", [0, 1, -1e-3, math.nan, math.inf, "fine", None, True])
@@ -258,29 +243,6 @@ def test_scenes_without_an_estimate():
     numerics = xc.Numerics(contact_method=methods.penalty())
     with pytest.raises(xc.ProblemError, match="no estimate"):
         xc.adapt(edge(numerics=numerics), 1e-3)
-
-
-# Wanted sizes ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("order", "dim"), [(2, 2), (2, 3), (1, 3)])
-def test_wanted_sizes_give_the_wanted_sum(order, dim):
-    """Shares that follow the law from which the sizes come: the sum is as wanted."""
-    rng = np.random.default_rng(7103)
-    shares = np.exp(rng.normal(size=(1, 400)))
-    total = shares.sum()
-    ratio = size_ratios(shares, np.array([2 * total]), 1.2 * total, order, dim)
-    assert 0.25 < ratio.min() < 1
-    assert (shares * ratio ** (2 * order)).sum() == pytest.approx(0.6 * total, rel=1e-6)
-    # Cells that are refined have equal shares then.
-    left = (shares[0] * ratio ** (2 * order + dim))[ratio < 1]
-    assert np.ptp(left) <= 1e-6 * left.max()
-
-
-def test_errors_that_are_small_enough_ask_for_nothing():
-    shares = np.array([[1.0, 2.0], [0.0, 0.0]])
-    assert (size_ratios(shares, np.array([3.0, np.nan]), 4.0, 2, 2) == 1).all()
-    assert (size_ratios(shares, np.array([np.nan, np.nan]), 1e-30, 2, 2) == 2.0**-2.5).all()
 
 
 def test_a_scene_at_rest_is_not_refined():

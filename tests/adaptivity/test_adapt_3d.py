@@ -5,16 +5,11 @@ References: Newman and Raju (1983, 5 %) for surface and corner cracks, the penny
 """
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.adaptivity import sizes_3d
-from xcrack.adaptivity.indicators import counted_places, values
-from xcrack.adaptivity.resolved import resolved_problem
-from xcrack.sif.sif import KErrors
 
 STEEL = xc.Isotropic(1.0, 0.3)
 PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
@@ -151,76 +146,3 @@ def test_two_pennies_close_to_each_other():
     assert one.best[one.x[:, 0].argmax(), 0] == pytest.approx(0.555, rel=0.03)
     assert one.best[one.x[:, 0].argmin(), 0] == pytest.approx(0.5155, rel=0.03)
     assert other.best[other.x[:, 0].argmin(), 0] == pytest.approx(0.555, rel=0.03)
-
-
-# By the need of each ----------------------------------------------------------------------------
-
-
-def intensity(x, bar, at_surface=None, front=None):
-    """K of 1 with these half-widths at some places of a line."""
-    n = len(x)
-    point = np.stack([x, 0 * x, 0 * x], axis=1)
-    zero = np.zeros((n, 3))
-    own = np.zeros(n, dtype=bool)
-    return xc.SIF(
-        x=point, frame=np.tile(np.eye(3), (n, 1, 1)), K=zero + 1.0, T=np.full(n, np.nan),
-        spread=zero, s=np.asarray(x, float),
-        front=np.zeros(n, dtype=np.int64) if front is None else front,
-        at_surface=own if at_surface is None else at_surface, closed=own,
-        domain_cells=np.full(n, 3.0),
-        errors=KErrors(zero, zero + np.asarray(bar)[:, None], ("",) * n),
-    )  # fmt: skip
-
-
-def state(*sifs, pressed=(), beside=None):
-    """What a round has measured, as far as the next mesh asks for it."""
-    best, bar = values([sifs], [0], beside or (0.0,) * len(sifs))
-    return SimpleNamespace(
-        sifs=[sifs], solutions=[SimpleNamespace(at_rest=False)], K=best, bar=bar,
-        pressed_cracks=pressed, surface_depths=beside or (0.0,) * len(sifs),
-        scale=np.abs(best).max(),
-    )  # fmt: skip
-
-
-def test_cracks_become_finer_by_their_own_need():
-    x = np.linspace(0, 1, 5)
-    now = state(intensity(x, x * 0 + 0.001), intensity(x, x * 0 + 0.01), intensity(x, x * 0 + 0.2))
-    times = [sizes_3d._refinement_factor(now, c, 0.005, 0.5) for c in range(3)]
-    assert times[0] == 1.0
-    assert 1.5 <= times[1] < times[2] == 2.0
-    pressing = state(intensity(x, x * 0 + 0.001), pressed=(0,))
-    assert sizes_3d._refinement_factor(pressing, 0, 0.005, 0.5) == 1.5
-    missing = state(intensity(x, x * 0 + np.nan))
-    assert sizes_3d._refinement_factor(missing, 0, 0.005, 0.5) == 1.5
-
-
-def test_a_front_without_finer_cells_keeps_its_bars():
-    """Its K has not changed because its cells have not: that is no small error."""
-    x = np.linspace(0, 1, 5)
-    before, now = intensity(x, x * 0 + 0.02), intensity(x, x * 0 + 0.03)
-    assert np.allclose(sizes_3d._shorten_errors(now, before, is_finer=False).bar, 0.02)
-    assert (sizes_3d._shorten_errors(now, before, is_finer=True).bar == 0).all()
-
-
-def test_places_beside_a_free_surface_do_not_count():
-    s = np.linspace(0, 1, 11)
-    ends = (s < 0.05) | (s > 0.95)
-    open_front = intensity(s, s * 0, at_surface=ends)
-    assert counted_places(open_front, 0.0).tolist() == (~ends).tolist()
-    assert counted_places(open_front, 0.25).tolist() == ((s > 0.25) & (s < 0.75)).tolist()
-    assert counted_places(intensity(s, s * 0), 0.25).all()  # a closed front is nowhere beside one
-    best, bar = values([[intensity(s, s * 0, at_surface=s >= 0)]], [0], [0.1])
-    assert best.tolist() == [[0.0, 0.0, 0.0]]
-    assert np.isnan(bar).all()
-
-
-def test_each_front_has_cells_of_its_own_size():
-    cracks = [
-        xc.penny_crack((-0.5, 0.0, 0.0), (0, 0, 1), 0.25),
-        xc.penny_crack((0.6, 0.0, 0.0), (0, 0, 1), 0.1),
-    ]
-    problem = resolved_problem(block(*cracks))
-    mesh = sizes_3d.first_mesh(problem)
-    at = [mesh.cell_tree.query(c.points[c.fronts[0]])[1] for c in problem.placed]
-    large, small = (float(np.median(mesh.cell_size[own])) for own in at)
-    assert 1.6 < large / small < 4.0

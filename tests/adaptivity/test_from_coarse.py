@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.adaptivity import sizes_3d
-from xcrack.adaptivity.resolved import resolved_problem
-from xcrack.base.errors import CoarseMeshError
 
 STEEL = xc.Isotropic(1.0, 0.3, plane="strain")
 PULL = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
@@ -78,13 +75,6 @@ def test_an_end_half_a_cell_from_the_boundary_is_a_tip():
     assert adapted.sif.best[0, 0] == pytest.approx(f * math.sqrt(math.pi), rel=7e-3)
 
 
-def test_a_mesh_that_is_fine_enough_stays():
-    problem = plate(INNER, n=6)
-    fine = resolved_problem(problem)
-    assert resolved_problem(fine) is fine
-    assert len(fine.mesh.cells) > len(problem.mesh.cells)
-
-
 def test_what_no_mesh_can_hold_is_refused():
     """Two cracks that cross do so in any mesh."""
     problem = plate([(20, 20), (21, 21)], [(20, 21), (21, 20)])
@@ -110,49 +100,3 @@ def test_growth_from_a_crack_within_a_cell():
     life = 2 / (1e-3 * math.pi**1.5) * (0.35**-0.5 - half**-0.5)
     assert half > 0.5
     assert step.cycles == pytest.approx(life, rel=2e-2)
-
-
-# 3D --------------------------------------------------------------------------------------------
-
-BLOCK_PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
-
-
-def block(*cracks):
-    mesh = xc.box((-1, -1, -1), (1, 1, 1), 4)
-    return xc.Problem(mesh, xc.Isotropic(1.0, 0.3), cracks, loads=BLOCK_PULL, contact="off")
-
-
-@pytest.mark.parametrize(
-    ("crack", "radius", "tips"),
-    [
-        (xc.penny_crack((0.01, 0.02, 0.013), (0, 0, 1), 0.1), 0.1, 1),
-        (xc.elliptic_crack((-1, 0.02, 0.013), (0, 0, 1), (1, 0, 0), 0.1, 0.15), 0.12, 1),
-        (xc.elliptic_crack((-1, -1, 0.013), (0, 0, 1), (1, 0, 0), 0.12, 0.12), 0.12, 1),
-    ],
-)
-def test_a_crack_within_a_cell_in_3d(crack, radius, tips):
-    """Inner, surface and corner cracks: fronts are seen, with the cells of the first mesh."""
-    problem = block(crack)
-    assert problem.mesh.cell_size.min() > 0.8
-    with pytest.raises(CoarseMeshError):
-        _ = problem.placed
-    placed = resolved_problem(problem)
-    assert placed.placed[0].n_tips == tips
-    mesh = sizes_3d.first_mesh(problem)
-    x = placed.placed[0].points[placed.placed[0].fronts[0]]
-    x = x[(np.abs(x) < 0.99).all(axis=1)]
-    at = mesh.cell_tree.query(x)[1]
-    assert np.median(mesh.cell_size[at]) <= radius / 2
-    assert len(mesh.cells) < 40_000
-
-
-def test_cells_between_two_fronts_are_as_small_as_their_distance():
-    """Pennies of radius .2 with .1 between them, in one cell; a third one far away is coarser."""
-    cracks = [
-        xc.penny_crack((-0.25, 0.0, 0.0), (0, 0, 1), 0.2),
-        xc.penny_crack((0.25, 0.0, 0.0), (0, 0, 1), 0.2),
-    ]
-    mesh = sizes_3d.first_mesh(block(*cracks))
-    between, away = mesh.cell_tree.query([(0.0, 0.0, 0.0), (-0.45, 0.0, 0.0)])[1]
-    assert mesh.cell_size[between] <= 0.05 * 1.01
-    assert mesh.cell_size[away] > 0.055

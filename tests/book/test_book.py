@@ -7,9 +7,8 @@ from importlib import import_module
 import pytest
 
 import xcrack as xc
-from xcrack.verification.book import run as runner
 from xcrack.verification.book.case import REQUIREMENTS, Case, Value
-from xcrack.verification.book.run import Book, chosen, find_cases, run_case, run_cases
+from xcrack.verification.book.run import Book, chosen, find_cases, line_of, run_case, run_cases
 
 CASES = find_cases()
 PLANE = [case for case in CASES if case.dim != 3 and case.quick]
@@ -23,8 +22,8 @@ def check(case, *, quick):
     result = run_case(case, quick=quick)
     if result.skipped:
         pytest.skip(result.skipped)
-    print(runner.line_of(result))
-    assert result.passed, "\n".join([runner.line_of(result), *map(str, result.rows)])
+    print(line_of(result))
+    assert result.passed, "\n".join([line_of(result), *map(str, result.rows)])
 
 
 @pytest.mark.parametrize("case", PLANE, ids=lambda case: case.id)

@@ -9,8 +9,7 @@ import pytest
 
 import xcrack as xc
 from support.case_texts import STRIP, STRIP_GROWTH, STRIP_PULL
-from xcrack.app.main import main
-from xcrack.app.sweep import values_of
+from xcrack.__main__ import main
 from xcrack.base.units import FORCE, LENGTH, STRESS, TOUGHNESS, Units
 
 pytestmark = [
@@ -394,8 +393,8 @@ def test_sweep_is_one_table_and_one_picture(tmp_path, capsys):
         xc.sweep(file, {key: [v] if key != "cracks.0.points.1.0" else [4, 30]
                         for key, v in changes.items()})  # fmt: skip
     assert stamp == {path: path.stat().st_mtime_ns for path in folder.glob("row_*")}
-    with pytest.raises(xc.ProblemError, match="give a key of the file and its values"):
-        values_of("radius")
+    assert main(["sweep", str(file), "--set", "radius"]) == 2
+    assert "give a key of the file and its values" in capsys.readouterr().err
     with pytest.raises(xc.ProblemError, match="a list is empty"):
         xc.sweep(file, {"title": []})
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import xcrack as xc
-from xcrack.app.main import main
+from xcrack.__main__ import main
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning"),
@@ -58,9 +58,10 @@ def test_verify_says_how_it_went(tmp_path, capsys, monkeypatch):
     assert main(["verify", "--quick", "-k", "cycle-rule", "-o", str(tmp_path / "book.html")]) == 0
     assert "1 cases in 0 s: all right" in capsys.readouterr().out
     assert (tmp_path / "book.html").is_file()
-    from xcrack.verification.book.cases import lives
-
-    monkeypatch.setattr(lives, "cycles_between", lambda a0, a1, r0, r1: (a1 - a0) / r0)
+    monkeypatch.setattr(
+        "xcrack.verification.book.cases.lives.cycles_between",
+        lambda a0, a1, r0, r1: (a1 - a0) / r0,
+    )
     assert main(["verify", "--quick", "-k", "cycle-rule"]) == 1
     assert "FAILED" in capsys.readouterr().out
     assert main(["verify", "-k", "nothing"]) == 2

@@ -11,7 +11,9 @@ from support import exact
 from support import scenes_2d as scenes
 from support import scenes_friction as rubbing
 from support.scenes_2d import SIDES
+from xcrack.analysis.friction import tangential_rows, tangents, weak_slip
 from xcrack.analysis.multipliers import gap_rows, multipliers
+from xcrack.fem.facets import arc_position
 from xcrack.fem.loads import load_vector
 from xcrack.fem.system import build
 
@@ -539,3 +541,80 @@ def test_dissipation_where_stick_turns_to_slip():
     solutions = xc.solve(problem, states=[load(*each) for each in path])
     dissipated = np.array([s.dissipated for s in solutions])
     np.testing.assert_allclose(dissipated, exact, rtol=1e-3, atol=3e-5 * W * up)
+
+
+# Memory of slip -----------------------------------------------------------------------------------
+
+TURN = 0.31
+
+
+def remembered(points=((-0.4, 0.0), (0.4, 0.0))):
+    crack = xc.line_crack(np.array(points) @ scenes.rows(TURN))
+    return xc.Problem(
+        scenes.perturbed(16, 3), xc.Isotropic(1.0, 0.3, "strain"), [crack], contact="on",
+        friction=0.3,
+    )  # fmt: skip
+
+
+def sheared(tau=0.6, p=1.0):
+    field = lambda x, y: exact.uniform_stress(x, y, 0.0, -p, tau, 1.0, 0.3)  # noqa: E731
+    return scenes.tractions(scenes.turned(field, (0.0, 0.0), TURN), SIDES)
+
+
+def slips_of(problem, before):
+    """Weak slips that a memory gives the functions of a crack, and their rows."""
+    model = build(problem)
+    lips = model.lips[0]
+    m = multipliers(
+        model.space, 0, lips, "reduced", model.imposed_values.is_fixed, has_friction=True
+    )
+    rows = tangential_rows(model.space, m, lips)[0]
+    return (
+        weak_slip(model, m, tangents(lips), before)[0],
+        rows,
+        m,
+        lips,
+        model.space.cracks[0].points,
+    )
+
+
+def test_memory_of_the_same_crack_is_its_slip():
+    solution = xc.solve(remembered(), [sheared()])[0]
+    weak, rows, *_ = slips_of(remembered(), solution.reuse.slip[0])
+    assert np.abs(weak - rows @ solution.u).max() <= 1e-12 * np.abs(weak).max()
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        ((-0.4, 0.0), (0.4, 0.0), (0.5, 0.05)),
+        ((-0.5, 0.02), (-0.4, 0.0), (0.4, 0.0)),
+        ((-0.5, 0.02), (-0.4, 0.0), (0.4, 0.0), (0.5, 0.05)),
+    ],
+    ids=["right", "left", "both"],
+)
+def test_memory_goes_to_the_old_faces_alone(points):
+    solution = xc.solve(remembered(), [sheared()])[0]
+    longer = remembered(points)
+    weak, _, m, lips, line = slips_of(longer, solution.reuse.slip[0])
+    s = arc_position(line, m.centre)
+    first = np.linalg.norm(np.diff(line, axis=0), axis=1)[0] if points[0][0] < -0.4 else 0.0
+    density = np.abs(weak) / m.measure
+    assert density[(s > first + 0.2) & (s < first + 0.6)].min() >= 0.3 * density.max()
+    assert density[(s < first - 0.1) | (s > first + 0.9)].max(initial=0.0) == 0
+    assert np.abs(weak).sum() == pytest.approx(
+        np.abs(solution.contact[0].measure @ solution.contact[0].slip), rel=1e-2
+    )
+    assert len(lips)
+
+
+def test_memory_follows_a_corrected_face():
+    """The last face turns and stretches a little: slip goes with the share of its length."""
+    line = ((-0.4, 0.0), (0.2, 0.0), (0.4, 0.05))
+    corrected = ((-0.4, 0.0), (0.2, 0.0), (0.41, 0.04), (0.55, 0.05))
+    solution = xc.solve(remembered(line), [sheared()])[0]
+    weak, _, m, _, points = slips_of(remembered(corrected), solution.reuse.slip[0])
+    ahead = arc_position(points, m.centre) > 0.9
+    assert np.abs(weak[ahead]).max(initial=0.0) == 0
+    whole = np.abs(solution.contact[0].measure @ solution.contact[0].slip)
+    assert np.abs(weak.sum()) == pytest.approx(whole, rel=3e-2)

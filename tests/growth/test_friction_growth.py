@@ -11,11 +11,6 @@ from support import exact
 from support import scenes_2d as scenes
 from support import scenes_friction as rubbing
 from support.scenes_2d import SIDES
-from xcrack.analysis.friction import weak_slip
-from xcrack.analysis.solve import solve_states
-from xcrack.fem.facets import arc_position
-from xcrack.fem.system import build
-from xcrack.linalg.engine import SolverState
 
 TURN = 0.31
 
@@ -51,8 +46,9 @@ def test_a_cycle_is_repeated_until_slip_returns():
     assert effective.tolist() == pytest.approx([0.0, tau - mu, mu, tau - mu])
     cycle = states[2:]
     once = xc.solve(problem, cycle)
-    again = solve_states(problem, cycle, reuse=SolverState(), is_repeated=True)
-    K = np.stack([x.K for x in xc.stress_intensities(again)])[:, 1, 1]
+    repeated = xc.respond(problem, cycle)
+    again = repeated.solutions
+    K = np.stack([row[0].K for row in repeated.sif])[:, 1, 1]
     assert K == pytest.approx(effective[2:] * np.sqrt(np.pi), abs=1e-3)
     assert once[0].dissipated == 0
     assert again[1].dissipated == pytest.approx(again[0].dissipated, rel=1e-2)
@@ -61,73 +57,11 @@ def test_a_cycle_is_repeated_until_slip_returns():
 def test_a_cycle_that_slips_back_from_its_memory_is_the_same():
     """The same crack again, from what the cycle left behind: nothing changes."""
     problem, cycle = cracked(0.3), xc.Cycle(states=[state(-0.6), state(0.6)])
-    first = xc.respond(problem, cycle.load_states, SolverState())
+    first = xc.respond(problem, cycle.load_states)
     second = xc.respond(problem, cycle.load_states, first.reuse)
     largest = max(np.abs(answer[0].K).max() for answer in first.sif)
     for one, two in zip(first.sif, second.sif, strict=True):
         assert np.abs(one[0].K - two[0].K).max() <= 1e-5 * largest
-
-
-def slips_of(problem, before):
-    """Weak slips that a memory gives the functions of a crack, and their rows."""
-    model = build(problem)
-    from xcrack.analysis.friction import tangential_rows, tangents
-    from xcrack.analysis.multipliers import multipliers
-
-    lips = model.lips[0]
-    m = multipliers(
-        model.space, 0, lips, "reduced", model.imposed_values.is_fixed, has_friction=True
-    )
-    rows = tangential_rows(model.space, m, lips)[0]
-    return (
-        weak_slip(model, m, tangents(lips), before)[0],
-        rows,
-        m,
-        lips,
-        model.space.cracks[0].points,
-    )
-
-
-def test_memory_of_the_same_crack_is_its_slip():
-    solution = xc.solve(cracked(0.3), [state(0.6)])[0]
-    weak, rows, *_ = slips_of(cracked(0.3), solution.reuse.slip[0])
-    assert np.abs(weak - rows @ solution.u).max() <= 1e-12 * np.abs(weak).max()
-
-
-@pytest.mark.parametrize(
-    "points",
-    [
-        ((-0.4, 0.0), (0.4, 0.0), (0.5, 0.05)),
-        ((-0.5, 0.02), (-0.4, 0.0), (0.4, 0.0)),
-        ((-0.5, 0.02), (-0.4, 0.0), (0.4, 0.0), (0.5, 0.05)),
-    ],
-    ids=["right", "left", "both"],
-)
-def test_memory_goes_to_the_old_faces_alone(points):
-    solution = xc.solve(cracked(0.3), [state(0.6)])[0]
-    longer = cracked(0.3, points=points)
-    weak, _, m, lips, line = slips_of(longer, solution.reuse.slip[0])
-    s = arc_position(line, m.centre)
-    first = np.linalg.norm(np.diff(line, axis=0), axis=1)[0] if points[0][0] < -0.4 else 0.0
-    density = np.abs(weak) / m.measure
-    assert density[(s > first + 0.2) & (s < first + 0.6)].min() >= 0.3 * density.max()
-    assert density[(s < first - 0.1) | (s > first + 0.9)].max(initial=0.0) == 0
-    assert np.abs(weak).sum() == pytest.approx(
-        np.abs(solution.contact[0].measure @ solution.contact[0].slip), rel=1e-2
-    )
-    assert len(lips)
-
-
-def test_memory_follows_a_corrected_face():
-    """The last face turns and stretches a little: slip goes with the share of its length."""
-    line = ((-0.4, 0.0), (0.2, 0.0), (0.4, 0.05))
-    corrected = ((-0.4, 0.0), (0.2, 0.0), (0.41, 0.04), (0.55, 0.05))
-    solution = xc.solve(cracked(0.3, points=line), [state(0.6)])[0]
-    weak, _, m, _, points = slips_of(cracked(0.3, points=corrected), solution.reuse.slip[0])
-    ahead = arc_position(points, m.centre) > 0.9
-    assert np.abs(weak[ahead]).max(initial=0.0) == 0
-    whole = np.abs(solution.contact[0].measure @ solution.contact[0].slip)
-    assert np.abs(weak.sum()) == pytest.approx(whole, rel=3e-2)
 
 
 def test_a_stuck_crack_does_not_grow():

@@ -17,7 +17,6 @@ from xcrack import (
     paris,
     walker,
 )
-from xcrack.base.errors import warn
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -237,35 +236,6 @@ def test_a_negative_ratio_is_warned_of_where_the_law_depends_on_it(law, cycle, w
 
 
 # --- warnings that come again --------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("stop", [None, 3])
-def test_a_repeated_warning_is_summarised_once(stop):
-    """Each kind when it comes first, and one summary, whether the run ends or is left."""
-    whole = formula(mode_I())
-
-    def response(problem, *rest):
-        a = float(problem.placed[0].points[-1, 0])
-        warn(f"K at [{a}, 0.37]: the domain is clipped to {1 / a:.4g} (2.3 cells)")
-        if a > 12:
-            warn("a crack is long")
-        return whole(problem, *rest)
-
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        steps = grow(plate(), LAW, max_hoop_stress, CYCLE, da=2.0, max_steps=6, response=response)
-        for step in steps:
-            if step.index == stop:
-                break
-        steps.close()
-    texts = [str(w.message) for w in caught]
-    assert all(w.filename == __file__ for w in caught)
-    assert texts[0].startswith("K at [5.0, 0.37]: the domain is clipped to 0.2 ")
-    assert texts[1:-1] == ([] if stop else ["a crack is long"])
-    n = 4 if stop else 6
-    assert f"in {n} of {n} steps, from step 0 to {n - 1}" in texts[-1]
-    assert f"K at [{5.0 + 2 * (n - 1)}, 0.37]" in texts[-1]  # the last of them in full
-    assert ("a crack is long" in texts[-1]) == (stop is None)
 
 
 def test_a_warning_that_comes_once_is_not_in_the_summary():

@@ -4,7 +4,6 @@ import pytest
 
 import xcrack as xc
 from xcrack import ProblemError
-from xcrack.growth.step import numbers_after
 
 
 def test_a_join_says_where_and_when():
@@ -22,21 +21,3 @@ def test_bad_parts_of_a_join_are_refused(wrong):
     good = {"step": 4, "N": 1.0, "point": (0.0, 1.0), "cracks": (0, 1)}
     with pytest.raises(ProblemError, match=f"Join: {next(iter(wrong))}"):
         xc.Join(**good | wrong)
-
-
-@pytest.mark.parametrize(
-    ("n", "pairs", "left", "numbers"),
-    [
-        (3, [], 3, [0, 1, 2]),
-        (3, [(0, 1)], 2, [0, 0, 1]),
-        (4, [(1, 3)], 3, [0, 1, 2, 1]),
-        (4, [(0, 1), (2, 3)], 2, [0, 0, 1, 1]),
-        (3, [(0, 1), (0, 2)], 1, [0, 0, 0]),
-        (3, [(1, 2), (0, 1)], 1, [0, 0, 0]),
-        (4, [(0, 1), (2, 3)], 3, [0, 1, 2, 2]),
-        (4, [(0, 3), (0, 3)], 4, [0, 1, 2, 3]),  # one ends on the other: both stay
-    ],
-)
-def test_numbers_after_joins(n, pairs, left, numbers):
-    joins = [xc.Join(1, 1.0, (0.0, 0.0, 0.0), pair) for pair in pairs]
-    assert numbers_after(n, joins, left) == numbers

@@ -14,6 +14,7 @@ import xcrack as xc
 from support.scenes_fronts import graded, lines
 from xcrack.growth import joins_3d
 from xcrack.growth.gaps import amplification, part_of_time
+from xcrack.growth.step import numbers_after
 from xcrack.mesh.triangulation import face_areas
 from xcrack.view.report_results import growth
 from xcrack.view.report_source import Source
@@ -283,3 +284,21 @@ def fabrikant(gap, radial=20, around=64):
     n = np.fft.fftfreq(around, 1 / around)
     mode = np.fft.fft(p, axis=1) / around * np.exp(-1j * np.pi * n / around)
     return float(((w * np.sin(q))[:, None] * mode * np.sin(q)[:, None] ** np.abs(n)).sum().real)
+
+
+@pytest.mark.parametrize(
+    ("n", "pairs", "left", "numbers"),
+    [
+        (3, [], 3, [0, 1, 2]),
+        (3, [(0, 1)], 2, [0, 0, 1]),
+        (4, [(1, 3)], 3, [0, 1, 2, 1]),
+        (4, [(0, 1), (2, 3)], 2, [0, 0, 1, 1]),
+        (3, [(0, 1), (0, 2)], 1, [0, 0, 0]),
+        (3, [(1, 2), (0, 1)], 1, [0, 0, 0]),
+        (4, [(0, 1), (2, 3)], 3, [0, 1, 2, 2]),
+        (4, [(0, 3), (0, 3)], 4, [0, 1, 2, 3]),  # one ends on the other: both stay
+    ],
+)
+def test_numbers_after_joins(n, pairs, left, numbers):
+    joins = [xc.Join(1, 1.0, (0.0, 0.0, 0.0), pair) for pair in pairs]
+    assert numbers_after(n, joins, left) == numbers

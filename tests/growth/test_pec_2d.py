@@ -7,8 +7,6 @@ from scipy.integrate import quad, solve_ivp
 from support.growth_fakes import STRESS, formula, plate
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from xcrack import Cycle, ProblemError, collect, grow, line_crack, load, max_hoop_stress, paris
-from xcrack.crack.crack import tip_frames
-from xcrack.growth.step_length import first_length, next_length, step_error
 
 LAW = paris(C=1e-11, m=3.0)
 CYCLE = Cycle(0.0, 1.0)
@@ -22,7 +20,7 @@ def end_of(problem, **options):
 
 def length_of(crack):
     """Of a straight edge crack, in the body."""
-    return float(tip_frames(crack)[0][0, 0])
+    return float(crack.points[-1, 0])
 
 
 # --- order -------------------------------------------------------------------------------------
@@ -39,10 +37,9 @@ def pulling(x):
 
 def along_a_field(problem, c):
     """K whose hoop stress is largest in the direction that the field has at the tip."""
-    x, frame = tip_frames(problem.placed[c])
-    ahead = np.arctan2(frame[0, 0, 1], frame[0, 0, 0])
-    angle = wanted(x[0]) - ahead
-    K_I = pulling(x[0])
+    before, x = problem.placed[c].points[-2:]
+    angle = wanted(x) - np.arctan2(*(x - before)[::-1])
+    K_I = pulling(x)
     return [[K_I, -K_I * np.sin(angle) / (3 * np.cos(angle) - 1)]]
 
 
@@ -63,7 +60,7 @@ def test_path_and_life_are_of_second_order():
         for n in steps:
             options = {"da": G / n, "max_steps": int(n) + 1, "integrator": name}
             step = end_of(plate(), **options, response=response)
-            tip = tip_frames(step.corrected[0])[0][0]
+            tip = step.corrected[0].points[-1]
             error.append(np.linalg.norm(tip - exact[:2]) / G)
             life.append(abs(step.cycles / exact[2] - 1))
             if name == "pec":
@@ -134,7 +131,7 @@ def leaving(problem, c):
     gone = problem.placed[1].n_tips == 0
     if not problem.placed[c].n_tips:
         return np.zeros((0, 2))
-    x = tip_frames(problem.placed[c])[0][0, 0]
+    x = problem.placed[c].points[-1, 0]
     return [[(10.0 + 0.2 * x) * (1.3 if gone else 1.0) if c == 0 else 12.0, 0.0]]
 
 
@@ -144,7 +141,7 @@ def test_a_tip_that_leaves_ends_what_its_solves_can_say():
     problem = plate([line_crack([(0, 8.3), (5.0, 8.3)]), line_crack([(0, -8.3), (52.0, -8.3)])])
     step = end_of(problem, da=3.0, max_steps=6, response=response)
     assert [crack.n_tips for crack in step.cracks] == [1, 0]
-    x = tip_frames(step.corrected[0])[0][0, 0]
+    x = step.corrected[0].points[-1, 0]
     exit_ = 8.0 / LAW(12.0, 0.0)
 
     def cycles(a, b, factor):
@@ -221,21 +218,3 @@ def test_the_linear_ratio_is_of_first_order_only():
         next(grow(plate(), LAW, max_hoop_stress, CYCLE, da=1.0, scaling="linear"))
     with pytest.raises(ProblemError, match=r"integrator = .rk4."):
         next(grow(plate(), LAW, max_hoop_stress, CYCLE, da=1.0, integrator="rk4"))
-
-
-# --- lengths of steps ----------------------------------------------------------------------------
-
-
-def test_steps_for_a_tolerance():
-    """A rule of second order whose error is c h²: the steps settle where it is the tolerance."""
-    c, tolerance = 2.0, 1e-2
-    h, before = first_length(1.0, tolerance, least_length=1e-3), None
-    for _ in range(12):
-        error = step_error(c * h**3, h, 0.0, 1.0, 0.0, tolerance)
-        h, before = next_length(h, error, before, least_length=1e-3), error
-    assert step_error(c * h**3, h, 0.0, 1.0, 0.0, tolerance) == pytest.approx(0.95**2.5, abs=0.03)
-    assert first_length(1.0, 1e-4, least_length=0.2) == 0.2
-    assert next_length(1.0, 1e6, 1.0, least_length=0.6) == 0.6
-    assert step_error(0.0, 1.0, 0.0, 1.0, 0.0, 1e-2) == 1e-3
-    assert step_error(0.0, 1.0, 0.02, 1.0, 0.0, 1e-2) == 2.0  # 2 % of the life of the step
-    assert step_error(0.0, 1.0, 0.02, 1.0, 100.0, 1e-2) == pytest.approx(2 / 15)  # of a long life

@@ -11,6 +11,7 @@ from benchmarks.wanted_error import SCENES, against, run, scene
 from xcrack import respond
 from xcrack.growth import cells as mesh_cells
 from xcrack.growth.options import run_of as rule_of
+from xcrack.growth.step_length import first_length, next_length, step_error
 from xcrack.mesh.locate import cell_sizes
 from xcrack.runs import run_folder
 from xcrack.verification.exact.plates import PLATE_EDGE
@@ -314,3 +315,21 @@ def test_too_few_unknowns():
     messages = [str(w.message) for w in caught]
     assert any("would have more than 2500 unknowns" in m for m in messages)
     assert any("tolerance = 0.0001 is not met at step" in m for m in messages)
+
+
+# Lengths of steps -----------------------------------------------------------------------------
+
+
+def test_steps_for_a_tolerance():
+    """A rule of second order whose error is c h²: the steps settle where it is the tolerance."""
+    c, tolerance = 2.0, 1e-2
+    h, before = first_length(1.0, tolerance, least_length=1e-3), None
+    for _ in range(12):
+        error = step_error(c * h**3, h, 0.0, 1.0, 0.0, tolerance)
+        h, before = next_length(h, error, before, least_length=1e-3), error
+    assert step_error(c * h**3, h, 0.0, 1.0, 0.0, tolerance) == pytest.approx(0.95**2.5, abs=0.03)
+    assert first_length(1.0, 1e-4, least_length=0.2) == 0.2
+    assert next_length(1.0, 1e6, 1.0, least_length=0.6) == 0.6
+    assert step_error(0.0, 1.0, 0.0, 1.0, 0.0, 1e-2) == 1e-3
+    assert step_error(0.0, 1.0, 0.02, 1.0, 0.0, 1e-2) == 2.0  # 2 % of the life of the step
+    assert step_error(0.0, 1.0, 0.02, 1.0, 100.0, 1e-2) == pytest.approx(2 / 15)  # of a long life

@@ -9,6 +9,7 @@ from xcrack import (
     Isotropic,
     Problem,
     ProblemError,
+    Response,
     box,
     el_haddad,
     elber,
@@ -22,10 +23,10 @@ from xcrack import (
     nasgro4_threshold,
     newman_closure,
     paris,
+    penny_crack,
     traction,
     walker,
 )
-from xcrack.fatigue.criteria import nominal_range
 from xcrack.testing import check_law
 
 CYCLE = Cycle(0.1, 1.0)
@@ -130,15 +131,25 @@ def test_a_closed_tip_in_a_list_of_loads_needs_a_choice():
 
 
 def test_signed_range():
-    """Mode I by hand: K 10 and -4. A crack that no state opens has no range."""
-    K = np.array([[[10.0, 0.0], [-1.0, 0.0]], [[-4.0, 0.0], [-3.0, 0.0]]])
-    dK, R = nominal_range(K, np.zeros(2), 0.3)
-    assert np.array_equal(dK, [14.0, 0.0])
-    assert np.array_equal(R, [-0.4, 0.0])
-    K = np.array([[[0.6, 0.0, 0.8]], [[-0.5, 0.0, 0.4]]])
-    dK, R = nominal_range(K, np.zeros(1), 0.0)
-    assert dK == pytest.approx(1.5)
-    assert R == pytest.approx(-0.5)
+    """Mode I by hand: K 10 and -4; modes I and III with nu = 0, 3D."""
+
+    def first(problem, *K):
+        def response(problem, states, reuse, bars):
+            rows = [[row] * len(problem.stations) for row in K]
+            return Response.of_K(problem, states, rows)
+
+        options = {"da": 0.1, "progress": False, "response": response}
+        law = paris(1e-11, 3, ratio="nominal")
+        return next(grow(problem, law, max_hoop_stress, Cycle(-0.4, 1.0), **options))
+
+    step = first(plate(), [-4.0, 0.0], [10.0, 0.0])
+    assert step.dK_eq[0].tolist() == [14.0]
+    assert step.R[0].tolist() == [-0.4]
+    body = box((-1, -1, -1), (1, 1, 1), 4)
+    crack = penny_crack((0.01, 0.02, 0.03), (0, 0, 1), 0.6)
+    step = first(Problem(body, Isotropic(1.0, 0.0), [crack]), [-0.5, 0.0, 0.4], [0.6, 0.0, 0.8])
+    assert step.dK_eq[0] == pytest.approx(1.5)
+    assert step.R[0] == pytest.approx(-0.5)
 
 
 @pytest.mark.parametrize("ratio", [None, "contact", "nominal"])

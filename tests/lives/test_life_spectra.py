@@ -27,16 +27,18 @@ from xcrack import (
     max_hoop_stress,
     normal,
     paris,
+    solve,
+    stress_intensity,
     traction,
     walker,
 )
-from xcrack.sif.sif import KErrors
 
 LAW = paris(1e-11, 3.0)
 FLIGHT = Spectrum([0.0, 1.0, 0.4, 0.6, 0.1, 0.9, 0.3], unit="flight")
 GIVEN = {"criterion": max_hoop_stress, "nu": 0.3}
 
 FORMULA = formula(mode_I())
+ENDS = [("top", 1.0), ("bottom", -1.0)]
 
 
 def run(law=LAW, cycle=FLIGHT, n=12, da=3.0, problem=None, **options):
@@ -167,12 +169,18 @@ def test_levels_are_a_source_of_their_own():
 
 def test_best_K_of_a_spectrum_is_rated_again():
     """Where K has bars growth follows the best K, and so does rerating."""
+    lines = [line_crack([(0.0, 0.37), (5.0, 0.37)])]
+    pulled = replace(plate(lines, n=(24, 16)), loads=[traction(s, (0, q)) for s, q in ENDS])
+    known = stress_intensity(solve(pulled, error=True)).errors
 
     def with_bars(*given):
         response = FORMULA(*given)
         bars = [
             [
-                replace(sif, errors=KErrors(0.1 * sif.K, 0.01 * np.abs(sif.K), ("",)))
+                replace(
+                    sif,
+                    errors=replace(known, eta=0.1 * sif.K, bar=0.01 * np.abs(sif.K), contact=None),
+                )
                 for sif in state
             ]
             for state in response.sif

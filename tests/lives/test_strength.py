@@ -30,7 +30,6 @@ from xcrack import (
     traction,
     write_factors,
 )
-from xcrack.model.problem import LoadLevel
 
 LAW = paris(1e-11, 3.0)
 STEEL = assessment_line(E=210e3, sigma_y=355.0, sigma_u=510.0)
@@ -183,7 +182,8 @@ def test_opening_load_is_where_the_tip_opens():
     K = {}
     problem, spectrum = bent()
     for factor in (level - 0.03, level + 0.03):
-        state = LoadLevel(factor, spectrum.steady)
+        pull = [traction("top", (0.0, 100 * factor)), traction("bottom", (0.0, -100 * factor))]
+        state = [*spectrum.steady, *pull]
         K[factor] = respond(problem, [state]).sif[0][0].K[0, 0]
     below, above = K.values()
     assert below < 2e-2 * step[65].sif[-1][0].K[0, 0]

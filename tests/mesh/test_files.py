@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from support.gmsh_models import gmsh_model
 from xcrack import Mesh, MeshError, XcrackError, XcrackWarning, box, read_mesh, write_mesh
 
 # Files that gmsh, meshio and pyvista wrote: data/make.py.
@@ -269,11 +270,9 @@ def test_sets_off_the_body_are_left_out_with_a_warning(tmp_path):
 @pytest.mark.parametrize("version", ["4.1", "2.2"])
 @pytest.mark.parametrize("d", [2, 3])
 def test_gmsh_reads_what_we_write(d, version, tmp_path):
-    from xcrack.mesh.gmsh_session import session
-
     mesh = scene(d)
     write_mesh(tmp_path / "ours.msh", mesh, msh_version=version)
-    with session() as gmsh:
+    with gmsh_model() as gmsh:
         gmsh.merge(str(tmp_path / "ours.msh"))
         groups = {
             (dim, gmsh.model.getPhysicalName(dim, tag)): tag

@@ -1,10 +1,10 @@
 import pickle
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 from xcrack import Mesh, MeshError, box
-from xcrack.mesh.mesh import local_edges, local_facets
 
 ROUND_OFF = 1e-12  # sums of a few hundred volumes, each exact to 1e-16
 BOXES = [((-1.0, 0.5), (2.0, 1.5), (5, 4)), ((0.0, -1.0, 2.0), (1.0, 1.0, 2.5), (3, 4, 2))]
@@ -90,21 +90,22 @@ def test_boundary_closes(lower, upper, n):
 @pytest.mark.parametrize(("lower", "upper", "n"), BOXES)
 def test_maps_agree_with_plain_loops(lower, upper, n):
     mesh = box(lower, upper, n)
-    edges = {tuple(sorted(c[pair])) for c in mesh.cells for pair in local_edges(mesh.dim)}
+    pairs = list(combinations(range(mesh.dim + 1), 2))
+    edges = {tuple(sorted((c[a], c[b]))) for c in mesh.cells for a, b in pairs}
     assert {tuple(e) for e in mesh.edges} == edges
     assert len(mesh.edges) == len(edges)
     longest = [
-        max(np.linalg.norm(mesh.points[c[a]] - mesh.points[c[b]]) for a, b in local_edges(mesh.dim))
+        max(np.linalg.norm(mesh.points[c[a]] - mesh.points[c[b]]) for a, b in pairs)
         for c in mesh.cells
     ]
     np.testing.assert_allclose(mesh.cell_size, longest, rtol=1e-15)
     for cell, corners in enumerate(mesh.cells):
-        for local, pair in enumerate(local_edges(mesh.dim)):
+        for local, pair in enumerate(pairs):
             edge = mesh.edges[mesh.cell_to_edge[cell, local]]
-            assert sorted(corners[pair]) == list(edge)
-        for local, others in enumerate(local_facets(mesh.dim)):
+            assert sorted(corners[list(pair)]) == list(edge)
+        for local in range(mesh.dim + 1):
             facet = mesh.cell_to_facet[cell, local]
-            assert sorted(corners[others]) == list(mesh.facets[facet])
+            assert sorted(np.delete(corners, local)) == list(mesh.facets[facet])
             assert cell in mesh.facet_to_cell[facet]
     offsets, around = mesh.point_to_cell
     for point in range(mesh.n_points):

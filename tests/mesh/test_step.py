@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from support.gmsh_models import gmsh_model
 from xcrack import GeometryError, XcrackError
 
 pytestmark = pytest.mark.gmsh
@@ -46,9 +47,7 @@ def faces_only(occ: Any) -> None:
 
 
 def step(folder: Path, make: Callable[[Any], None]) -> Path:
-    from xcrack.mesh.gmsh_session import session
-
-    with session() as gmsh:
+    with gmsh_model() as gmsh:
         make(gmsh.model.occ)
         gmsh.model.occ.synchronize()
         gmsh.write(str(folder / "part.step"))

@@ -13,7 +13,7 @@ import pytest
 import xcrack as xc
 from support.case_texts import STRIP, STRIP_GROWTH
 from support.decks import box_cases
-from xcrack.app.main import main
+from xcrack.__main__ import main
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")

@@ -13,7 +13,6 @@ import xcrack as xc
 from support import exact
 from support import scenes_2d as scenes
 from support.scenes_2d import SIDES
-from xcrack.analysis.solve import solve_states
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -347,9 +346,9 @@ def test_path_warm_start_and_first_set_do_not_matter(order):
         warm = None
         for k in (3, 7, 1, 5, 4, 0):
             cold = xc.solve(other, states=[states[k]])[0]
-            warmed = solve_states(other, [states[k]], reuse=warm)[0]
-            warm = warmed.reuse
-            for solution in (cold, warmed):
+            answer = xc.respond(other, [states[k]], warm)
+            warm = answer.reuse
+            for solution in (cold, *answer.solutions):
                 assert np.abs(solution.contact[0].pressure - reference[k]).max() <= 1e-9 * size
                 assert solution.report.operations["contact_iterations"] <= 30
 

@@ -7,7 +7,6 @@ import pytest
 
 import xcrack as xc
 from support import scenes_3d as scenes_space
-from xcrack.analysis.solve import solve_states
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 PRESS = [xc.traction("top", (0.3, 0, -1.0)), xc.traction("bottom", (-0.3, 0, 1.0)),
@@ -28,10 +27,10 @@ def scene(radius, **options):
 @pytest.mark.mission
 def test_next_step_starts_from_closed_lips():
     """One solve a state instead of two, and what a fresh start finds."""
-    first = solve_states(scene(0.55), [PRESS, PULL])
-    next_scene = replace(scene(0.58), mesh=first[0].problem.mesh)
-    warm = solve_states(next_scene, [PRESS, PULL], reuse=first[0].reuse)
-    fresh = solve_states(next_scene, [PRESS, PULL])
+    first = xc.respond(scene(0.55), [PRESS, PULL])
+    next_scene = replace(scene(0.58), mesh=first.solutions[0].problem.mesh)
+    warm = xc.respond(next_scene, [PRESS, PULL], first.reuse).solutions
+    fresh = xc.respond(next_scene, [PRESS, PULL]).solutions
     count = [s[0].report.operations for s in (warm, fresh)]
     assert count[0]["solves"] == 2 < count[1]["solves"]
     assert count[0]["iterations"] < count[1]["iterations"]
@@ -43,12 +42,11 @@ def test_next_step_starts_from_closed_lips():
 
 
 def test_a_crack_that_opens_again_gives_its_multipliers_back():
-    closed = solve_states(scene(0.55), [PRESS])
-    opened = solve_states(
-        replace(scene(0.55), mesh=closed[0].problem.mesh), [PULL],
-        reuse=closed[0].reuse,
-    )[0]  # fmt: skip
-    assert closed[0].contact[0] is not None
+    closed = xc.respond(scene(0.55), [PRESS])
+    (before,) = closed.solutions
+    again = replace(scene(0.55), mesh=before.problem.mesh)
+    (opened,) = xc.respond(again, [PULL], closed.reuse).solutions
+    assert before.contact[0] is not None
     assert opened.contact[0] is None
     assert opened.opening(0).min() >= 0
     assert not opened.report["multipliers of crack 0"].used

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from xcrack import ProblemError, Spectrum, rainflow
-from xcrack.fatigue.spectrum import turning_points
 
 ASTM = [-2, 1, -3, 5, -1, 3, -4, 4, -2]  # figure 6 of ASTM E1049-85
 
@@ -92,11 +91,6 @@ def test_where_a_block_begins_does_not_matter(history, shift, repeats):
     many = ranges(rainflow(np.tile(history, repeats)))
     assert many == {pair: n * repeats for pair, n in ranges(rainflow(history)).items()}
     assert ranges(rainflow(np.repeat(history, 2))) == ranges(rainflow(history))
-
-
-def test_turning_points_of_plateaus():
-    assert turning_points(np.array([0.0, 1.0, 1.0, 0.5, 0.5, 2.0, 0.0])).tolist() == [1, 3, 5, 6]
-    assert turning_points(np.array([3.0, 3.0])).tolist() == []
 
 
 @pytest.mark.parametrize(
