@@ -13,7 +13,10 @@ from xcrack.adaptivity import sizes_3d
 from xcrack.adaptivity.indicators import counted_places, values
 from xcrack.adaptivity.resolved import resolved_problem
 from xcrack.adaptivity.sizes_2d import size_ratios
+from xcrack.mesh.locate import locate
 from xcrack.mesh.refinement import refine_to
+from xcrack.mesh.simplex import leg_size
+from xcrack.sif.error import finer_along
 from xcrack.sif.sif import KErrors
 
 PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
@@ -85,6 +88,29 @@ def test_cells_between_two_fronts_are_as_small_as_their_distance():
     between, away = mesh.cell_tree.query([(0.0, 0.0, 0.0), (-0.45, 0.0, 0.0)])[1]
     assert mesh.cell_size[between] <= 0.05 * 1.01
     assert mesh.cell_size[away] > 0.055
+
+
+def test_adapt_refines_where_a_front_bends():
+    """Two cells a radius of curvature at least, where an ellipse is sharp."""
+    mesh = xc.box((-1,) * 3, (1,) * 3, 4)
+    crack = xc.elliptic_crack((0.01, 0.02, 0.013), (0, 0, 1), (1, 0, 0), 0.6, 0.3)
+    problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], contact="off")
+    first = sizes_3d.first_mesh(problem)
+    ends = crack.points[np.abs(crack.points[:, 0] - 0.01) > 0.599]
+    cells = np.unique(locate(first, ends)[0])
+    assert leg_size(first, cells) <= 0.3**2 / 0.6 / 2
+
+
+def test_finer_cells_along_a_front():
+    """Of the error of K by a finer mesh: cells of two thirds at the front, few beside it."""
+    crack = xc.plane_crack(
+        [(-1.5, -1.0, 0.03), (0.1, -1.0, 0.03), (0.1, 1.0, 0.03), (-1.5, 1.0, 0.03)]
+    )
+    problem = block(crack, n=5)
+    mesh, finer = problem.mesh, finer_along(problem, 0)
+    at, before = (m.cell_tree.query([(0.1, 0.0, 0.03)])[1] for m in (finer, mesh))
+    assert finer.cell_size[at] <= mesh.cell_size[before] / 1.5 * (1 + 1e-9)
+    assert len(finer.cells) < 8 * len(mesh.cells)
 
 
 # From bars

@@ -8,18 +8,19 @@ import pytest
 
 import xcrack as xc
 from support import exact
-from xcrack.linalg.coulomb import FrictionRows, all_stuck, coulomb, coulomb_3d
-from xcrack.verification.book.scenes_3d import CENTRE, NU, E, flat_crack
+from support.scenes_fronts import NU, flat_scene
 
 A, STRESS = 0.5, (-1.0, 0.6, 0.5)
+E, CENTRE = 1.0, np.array([0.013, -0.021, 0.0117])  # of the scene
 TAU = float(np.hypot(*STRESS[1:]))
 DIRECT, CG = xc.Numerics(linear="direct"), xc.Numerics(linear="iterative")
 
 
 def pressed_penny(h, mu, *, order=1, numerics=DIRECT):
     """Penny under pressure 1 and shear TAU, under its exact displacements."""
-    problem, Q = flat_crack(h, STRESS, contact="on", order=order, numerics=numerics)
-    return replace(problem, supports=[support(Q, TAU, mu=mu)], friction=mu), Q
+    problem, (_, Q) = flat_scene(h, stress=STRESS, seed=7203, contact="on")
+    given = {"supports": [support(Q, TAU, mu=mu)], "friction": mu, "numerics": numerics}
+    return replace(problem, order=order, **given), Q
 
 
 def support(Q, felt, rest=0.0, mu=None):
@@ -160,52 +161,3 @@ def straight(K, nu):
     """Growth in its plane by the range of K_II and K_III."""
     size = np.sqrt(((K[1] - K[0])[:, 1:] ** 2).sum(axis=1))
     return np.zeros(K.shape[1]), size, np.zeros(K.shape[1])
-
-
-# The dense problem --------------------------------------------------------------------------------
-
-
-def drawn(seed, g=10):
-    rng = np.random.default_rng(seed)
-    A_ = rng.normal(size=(3 * g, 9 * g)) / np.sqrt(9 * g)
-    size = 10 ** rng.uniform(-1, 0, g)
-    scale = np.tile(size, 3)
-    rows = FrictionRows(
-        scale[:, None] * (A_ @ A_.T) * scale,
-        size,
-        np.arange(g),
-        rng.choice([0.1, 0.3, 1.0], g),
-        1.0,
-    )
-    return rows, scale * rng.normal(size=3 * g)
-
-
-def test_drawn_problems():
-    for seed in range(60):
-        rows, d = drawn(seed + 808)
-        state = coulomb_3d(rows, d, all_stuck(rows))
-        g, largest = rows.n, np.abs(state.lam).max()
-        shear, slip = state.lam[g:].reshape(2, -1), state.gap[g:].reshape(2, -1)
-        bound = rows.mu * state.lam[:g]
-        assert state.lam[:g].min() >= -1e-12 * largest
-        assert state.gap[:g].min() >= -1e-9 * np.abs(d).max()
-        assert (np.linalg.norm(shear, axis=0) <= bound + 1e-7 * largest).all()
-        size = np.linalg.norm(slip, axis=0)
-        slides = size > 1e-7 * np.abs(d).max()
-        opposed = shear + bound * slip / np.where(slides, size, 1.0)
-        assert np.abs(opposed[:, slides]).max(initial=0.0) <= 1e-6 * largest
-
-
-def test_one_tangent_is_the_problem_of_2d():
-    for seed in range(20):
-        rows, d = drawn(seed + 202)
-        g = rows.n
-        F = rows.F.copy()
-        F[: 2 * g, 2 * g :] = F[2 * g :, : 2 * g] = 0.0
-        d[2 * g :] = 0.0
-        three = FrictionRows(F, rows.measure, rows.rubbing_rows, rows.mu, 1.0)
-        two = FrictionRows(F[: 2 * g, : 2 * g], rows.measure, rows.rubbing_rows, rows.mu, 1.0)
-        expected = coulomb(two, d[: 2 * g], all_stuck(two)).lam
-        lam = coulomb_3d(three, d, all_stuck(three)).lam
-        assert np.abs(lam[: 2 * g] - expected).max() <= 1e-7 * np.abs(expected).max()
-        assert np.abs(lam[2 * g :]).max() <= 1e-9 * np.abs(expected).max()

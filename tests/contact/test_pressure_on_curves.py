@@ -17,7 +17,7 @@ from xcrack import (
     solve,
     traction,
 )
-from xcrack.analysis.multipliers import multipliers
+from xcrack.analysis.multipliers import multipliers, vital_edges
 from xcrack.fem.system import build
 from xcrack.verification.exact.closed import partial_closure_pressure
 
@@ -119,3 +119,15 @@ def test_knots_are_dense_where_faces_are_straight():
     assert straight[0] >= 1.5 * straight[1]
     curved = [count(arc, kind) for kind in ("reduced", "sparse")]
     assert abs(curved[0] - curved[1]) <= 1
+
+
+def test_cover_of_edges_does_not_hang_on_numbers():
+    """Of edges as long as each other but for round-off, the first along the crack is removed."""
+    pairs = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+    length, place = np.ones(4), np.array([0.1, 0.2, 0.3, 0.4])
+    cover = vital_edges(pairs, length, place)
+    for k in range(4):
+        changed = length + 1e-12 * (np.arange(4) == k)
+        assert vital_edges(pairs, changed, place).tolist() == cover.tolist()
+    number = np.array([2, 0, 3, 1])
+    assert vital_edges(number[pairs], length, place).tolist() == cover.tolist()

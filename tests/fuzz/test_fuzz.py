@@ -8,8 +8,7 @@ import xcrack as xc
 from fuzz import damage
 from fuzz.kinds import NONSENSE, VALID
 from fuzz.run import PARTS, TABLE, drawn, run, table
-from xcrack import GrowthLaw, Load, Threshold
-from xcrack.model.supports import Condition
+from xcrack import GrowthLaw, Load, Threshold, fix
 
 _EXEMPT = {
     **dict.fromkeys(
@@ -39,7 +38,7 @@ _CALLED_BY_XCRACK = {
     "displacement_at",
     "factors",  # of loads that follow the crack
     "scaled",  # K and solutions, by these
-    *(name for kind in (Load, Condition, GrowthLaw, Threshold) for name in vars(kind)),
+    *(name for kind in (Load, *fix.__bases__, GrowthLaw, Threshold) for name in vars(kind)),
 }
 _MADE_BY_XCRACK = ("Solution",)  # by solve, from parts that users do not have
 

@@ -230,6 +230,21 @@ def test_fine_cells_follow_the_tip(tmp_path, monkeypatch):
     assert content(tmp_path / "part") == content(tmp_path / "whole")
 
 
+def test_nothing_is_lost_where_a_later_mesh_cannot_be_made(tmp_path, monkeypatch):
+    """The mesh as given serves the first step; then it is refined, and that fails."""
+
+    def fails(*args):
+        raise xc.MeshError("curves['hole'] takes the point elsewhere")
+
+    monkeypatch.setattr(mesh_cells, "refine_cells", fails)
+    monkeypatch.setattr(mesh_cells, "_WHOLE", 0.3)
+    given = xc.grow(**run_of(strip(5), tolerance=4e-4))
+    with pytest.raises(xc.MeshError, match=r"curves\['hole'\] takes the point") as caught:
+        xc.collect(given, tmp_path)
+    assert len(caught.value.history.steps) == len(xc.load(tmp_path).steps) == 1
+    assert "1 finished steps are in" in caught.value.__notes__[-1]
+
+
 # What is stored --------------------------------------------------------------------------------
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.growth import cells as mesh_cells
 
 STEEL = xc.Isotropic(210e3, 0.3)
 LAW = xc.paris(C=1e-3, m=3.0)
@@ -78,22 +77,3 @@ def test_curve_that_returns_points_elsewhere(kind, error, match):
     problem = xc.Problem(body, steel, [crack], loads=pull)
     with pytest.raises(error, match=match):
         next(steps(problem, tolerance=1e-2))
-
-
-def test_nothing_is_lost_where_a_later_mesh_cannot_be_made(tmp_path, monkeypatch):
-    """The mesh as given serves the first step; then it is refined, and that fails."""
-
-    def fails(*args):
-        raise xc.MeshError("curves['hole'] takes the point elsewhere")
-
-    monkeypatch.setattr(mesh_cells, "refine_cells", fails)
-    monkeypatch.setattr(mesh_cells, "_WHOLE", 0.3)
-    mesh = xc.box((0.0, -1.0), (1.0, 1.0), (5, 10))
-    pull = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
-    crack = xc.line_crack([(-0.1, 0.003), (0.2, 0.003)])
-    steel = xc.Isotropic(210e3, 0.3, plane="strain")
-    given = steps(xc.Problem(mesh, steel, [crack], loads=pull), tolerance=4e-4)
-    with pytest.raises(xc.MeshError, match=r"curves\['hole'\] takes the point") as caught:
-        xc.collect(given, tmp_path)
-    assert len(caught.value.history.steps) == len(xc.load(tmp_path).steps) == 1
-    assert "1 finished steps are in" in caught.value.__notes__[-1]

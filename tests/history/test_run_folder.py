@@ -16,9 +16,12 @@ from scripts.run_folder_page import PAGE, page_with_tables, patterns
 from support.growth_runs import *  # noqa: F403 - fixtures come by name
 from support.growth_runs import N_STEPS, Killed, Saboteur, assert_same, content, run_of
 from xcrack import ProblemError, XcrackWarning, collect, grow, load, resume
-from xcrack.runs import run_folder as run_files
-from xcrack.runs import store
-from xcrack.runs.step_arrays import packed_arrays
+
+
+def step_path(folder, index):
+    """The file of a step, as docs/run_folder.md names it."""
+    return folder / f"step_{index:05d}.npz"
+
 
 # --- to disk and on ----------------------------------------------------------------------------
 
@@ -99,12 +102,19 @@ def test_no_step_is_computed_after_until_was_true():
     ("written", "words"), [(2, "before the first release"), (4, "newer xcrack")]
 )
 @pytest.mark.parametrize("lost", [False, True], ids=["header", "steps"])
-def test_a_run_of_another_format(whole, monkeypatch, written, words, lost):
+def test_a_run_of_another_format(whole, written, words, lost):
     """Whether the header says so, or the steps where it is lost."""
     folder = whole.path.parent / "other"
-    with monkeypatch.context() as patch:
-        patch.setattr(run_files, "FORMAT", written)
-        collect(grow(**run_of()), folder)
+    collect(grow(**run_of()), folder)
+    for path in folder.glob("step_*.npz"):
+        with np.load(path) as members:
+            arrays = dict(members)
+        arrays.pop("array_count", None)
+        text, count = re.subn(r'("format": )3\b', rf"\g<1>{written}", str(arrays["run"]))
+        assert count == 1
+        np.savez(path, **arrays | {"run": np.array(text)})
+    header = (folder / "run.json").read_text(encoding="utf-8")
+    (folder / "run.json").write_text(header.replace('"format": 3', f'"format": {written}'))
     if lost:
         (folder / "run.json").unlink()
     before = content(folder)
@@ -127,12 +137,12 @@ def test_a_folder_of_an_older_format_is_refused_in_words(tmp_path):
 
 def test_a_step_that_knows_more_or_less_is_read(whole):
     """Arrays of a later version are not looked at; values with a default may be missing."""
-    path = run_files.step_path(whole.path, 1)
+    path = step_path(whole.path, 1)
     with np.load(path, allow_pickle=False) as members:
         arrays = dict(members)
     others = ("arrival_", "identity_", "array_count")
     less = {k: v for k, v in arrays.items() if not k.startswith(others)}
-    path.write_bytes(packed_arrays({**less, "later_array": np.arange(3)}))
+    np.savez(path, **less, later_array=np.arange(3))
     read = load(whole.path)
     assert len(read.steps) == len(whole.steps)
     assert read.steps[1].identities is None
@@ -141,7 +151,7 @@ def test_a_step_that_knows_more_or_less_is_read(whole):
 
 def test_a_step_with_fewer_arrays_than_it_had_is_damaged(whole):
     """As a bit of the directory of its file leaves it, which no checksum guards."""
-    path = run_files.step_path(whole.path, 2)
+    path = step_path(whole.path, 2)
     data = path.read_bytes()
     with np.load(path, allow_pickle=False) as members:
         arrays = {name: members[name] for name in members.files if "identity" not in name}
@@ -152,7 +162,7 @@ def test_a_step_with_fewer_arrays_than_it_had_is_damaged(whole):
 
 
 def test_a_member_whose_name_has_lost_its_ending_is_damage(whole):
-    path = run_files.step_path(whole.path, 2)
+    path = step_path(whole.path, 2)
     data = path.read_bytes()
     path.write_bytes(data.replace(b"identity_end_count.npy", b"identity_end_count.nqy"))
     with pytest.warns(XcrackWarning, match=r"step_00002\.npz"):
@@ -161,7 +171,7 @@ def test_a_member_whose_name_has_lost_its_ending_is_damage(whole):
 
 
 def test_a_member_that_holds_no_array_is_damage(whole):
-    path = run_files.step_path(whole.path, 2)
+    path = step_path(whole.path, 2)
     data = path.read_bytes()
     with zipfile.ZipFile(io.BytesIO(data)) as members:
         content_of = {name: members.read(name) for name in members.namelist()}
@@ -174,12 +184,15 @@ def test_a_member_that_holds_no_array_is_damage(whole):
 
 
 def test_what_cannot_be_stored_is_named(tmp_path):
+    pull = [xc.traction("top", (0, 1.0)), xc.traction("bottom", (0, -1.0))]
+    steel = xc.Isotropic(1.0, 0.3, "strain")
+    solution = xc.solve(xc.Problem(xc.box((0, 0), (1, 1), 3), steel, loads=pull))
     with pytest.raises(ProblemError, match=r"(Posix|Windows)Path cannot be stored"):
-        store.packed_content({"path": tmp_path}, {})
+        xc.save(replace(solution, state=tmp_path), tmp_path / "x.npz")
     tree = {"class": "subprocess:Popen", "fields": {"args": "true"}}
     np.savez(tmp_path / "x.npz", tree=np.array(json.dumps(tree)))
     with pytest.raises(ProblemError, match=r"x\.npz holds a 'subprocess:Popen'"):
-        store.load(tmp_path / "x.npz", {})
+        load(tmp_path / "x.npz")
 
 
 # --- what files hold -----------------------------------------------------------------------------
@@ -239,7 +252,7 @@ def test_every_field_of_a_step_survives(whole):
 @pytest.mark.parametrize("keep", [0, 1, 100])
 @pytest.mark.parametrize("index", [0, 2, N_STEPS - 1])
 def test_a_step_that_is_cut_short_is_computed_again(whole, index, keep):
-    path = run_files.step_path(whole.path, index)
+    path = step_path(whole.path, index)
     before = content(whole.path)
     path.write_bytes(path.read_bytes()[: keep * path.stat().st_size // 101])
     damaged = content(whole.path)
@@ -254,7 +267,7 @@ def test_a_step_that_is_cut_short_is_computed_again(whole, index, keep):
 @pytest.mark.parametrize("index", [0, 2, N_STEPS - 2])
 def test_a_lost_middle_step_is_computed_again_to_the_same_bytes(whole, index):
     """Nothing that was finished is lost: the steps behind it are moved aside."""
-    path = run_files.step_path(whole.path, index)
+    path = step_path(whole.path, index)
     before = content(whole.path)
     path.unlink()
     with pytest.warns(XcrackWarning, match=rf"{path.name} is missing .* {index} steps before it"):
@@ -328,7 +341,7 @@ def test_files_of_others_in_the_place_of_steps(whole, tmp_path):
     for name, data in junk(whole.path).items():
         folder = tmp_path / name
         folder.mkdir()
-        run_files.step_path(folder, 2).write_bytes(data)
+        step_path(folder, 2).write_bytes(data)
         with pytest.raises(ProblemError, match="holds no run"):
             load(folder)
         with pytest.warns(XcrackWarning, match="1 files that stood in .* were moved"):
@@ -336,7 +349,7 @@ def test_files_of_others_in_the_place_of_steps(whole, tmp_path):
         assert_same(history, whole)
         assert content(folder / "moved_aside_1") == {"step_00002.npz": data}
         # and in the place of a step of a run
-        run_files.step_path(folder, 2).write_bytes(data)
+        step_path(folder, 2).write_bytes(data)
         with pytest.warns(XcrackWarning, match=r"step_00002\.npz is not whole"):
             history = resume(folder, **run_of())
         assert_same(history, whole)
@@ -347,7 +360,7 @@ def test_files_of_others_in_the_place_of_steps(whole, tmp_path):
 def test_flipped_bits_are_noticed(whole):
     """A hundred places, drawn: the step is computed again, or the bit was one of padding."""
     before = content(whole.path)
-    path = run_files.step_path(whole.path, 2)
+    path = step_path(whole.path, 2)
     data = path.read_bytes()
     generator = np.random.default_rng(70412)
     for bit in generator.integers(0, 8 * len(data), 100):
@@ -366,8 +379,8 @@ def test_flipped_bits_are_noticed(whole):
 def test_a_step_of_another_run(whole, tmp_path):
     other = collect(grow(**run_of(da=1.8)), tmp_path / "other")
     before = content(whole.path)
-    path = run_files.step_path(whole.path, 3)
-    path.write_bytes(run_files.step_path(other.path, 3).read_bytes())
+    path = step_path(whole.path, 3)
+    path.write_bytes(step_path(other.path, 3).read_bytes())
     with pytest.warns(XcrackWarning, match=r"step_00003\.npz belongs to another run"):
         resume(whole.path, **run_of())
     assert content(whole.path) == before

@@ -73,8 +73,8 @@ def test_the_stiffness_is_not_indefinite(order):
     material = xc.Graded(lambda x: np.exp(6 * x[:, 0] - 4 * x[:, 1] ** 2), 0.3, "strain")
     crack = xc.line_crack([(0.23, 0.31), (0.55, 0.48), (0.71, 0.44)])
     mesh = scenes.perturbed((8, 8), 0).with_cell_sets({})
-    held = [xc.fix("left")]  # else the motions of the body are 0
-    K = matrix_of(xc.Problem(mesh, material, [crack], held, order=order)).toarray()
+    supports = [xc.fix("left")]  # else the motions of the body are 0
+    K = matrix_of(xc.Problem(mesh, material, [crack], supports, order=order)).toarray()
     values = scipy.linalg.eigvalsh((K + K.T) / 2)
     assert values[0] >= 1e-12 * values[-1]
 

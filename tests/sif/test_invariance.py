@@ -4,11 +4,9 @@ Tolerances are of round-off: nothing that decides what is cut, grouped or integr
 the last digits, on axes, or on the numbers of nodes.
 """
 
-import numpy as np
 import pytest
 
 from support import drawn_cracks
-from xcrack.analysis.multipliers import vital_edges
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -31,15 +29,3 @@ def test_drawn_scenes():
     beyond = {place: change for place, change in every.items() if change > 1e-6}
     print(f"\nbeyond 1e-6 of K: {len(beyond)} of {len(every)}: {beyond}")
     assert len(beyond) <= 0.01 * len(every)
-
-
-def test_cover_of_edges_does_not_hang_on_numbers():
-    """Of edges as long as each other but for round-off, the first along the crack is removed."""
-    pairs = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
-    length, place = np.ones(4), np.array([0.1, 0.2, 0.3, 0.4])
-    cover = vital_edges(pairs, length, place)
-    for k in range(4):
-        changed = length + 1e-12 * (np.arange(4) == k)
-        assert vital_edges(pairs, changed, place).tolist() == cover.tolist()
-    number = np.array([2, 0, 3, 1])
-    assert vital_edges(number[pairs], length, place).tolist() == cover.tolist()

@@ -12,8 +12,6 @@ import pytest
 import xcrack as xc
 from support import scenes_2d as scenes
 from support import scenes_friction
-from xcrack.mesh.kernels.splitting import graded_points
-from xcrack.mesh.simplex import gauss
 
 pytestmark = pytest.mark.filterwarnings("ignore::xcrack.XcrackWarning")
 
@@ -159,34 +157,6 @@ def test_a_tip_of_the_model_is_on_the_mesh_or_beside_it():
     x, y = solution.space.tips[1].x
     assert x == node[0]
     assert y == pytest.approx(middle[1], abs=1e-11)
-
-
-def test_no_point_of_a_short_segment_lies_on_the_tip():
-    """Its end is the tip but for round-off; a part as long as that was added to the rule."""
-    u, w = gauss(6)
-    tip = np.array([[1 / 3, 1 / 3]])
-    for length in 10.0 ** np.arange(-12, 0):
-        for angle in np.linspace(0.0, 2 * np.pi, 41):
-            begin = tip + length * scenes.rows(angle)[:1]
-            end = tip + np.array([[1.1e-16, -1.1e-16]])
-            _, place, weight = graded_points(begin, end, tip, u, w)
-            assert len(weight) == 6
-            assert place[:, 0].min() >= 0.99 * u.min() ** 2
-            assert weight.sum() == pytest.approx(np.linalg.norm(begin - end), rel=1e-12)
-
-
-@pytest.mark.parametrize("gap", [0.0, 1e-8, 1e-4, 1e-2, 0.3])
-def test_points_are_graded_from_a_tip_beyond_the_end(gap):
-    """The integral of 1/sqrt(r) along a segment that begins a little beside the tip is exact."""
-    u, w = gauss(6)
-    begin, end = np.array([[gap, 0.0]]), np.array([[gap + 1.0, 0.0]])
-    for a, b in ((begin, end), (end, begin)):
-        _, place, weight = graded_points(a, b, np.zeros((1, 2)), u, w)
-        r = (place @ np.concatenate([a, b]))[:, 0]
-        wanted = 2 * (np.sqrt(gap + 1) - np.sqrt(gap))
-        assert weight @ r**-0.5 == pytest.approx(wanted, rel=1e-12)  # round-off
-        assert weight.sum() == pytest.approx(1.0, rel=1e-12)
-        assert weight @ r**2 == pytest.approx(((gap + 1) ** 3 - gap**3) / 3, rel=1e-12)
 
 
 def test_K_that_is_no_number_is_refused():

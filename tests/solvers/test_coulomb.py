@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xcrack.linalg.coulomb import FrictionRows, Status, all_stuck, coulomb
+from xcrack.linalg.coulomb import FrictionRows, Status, all_stuck, coulomb, coulomb_3d
 from xcrack.linalg.coulomb import _sweep_functions as swept
 
 
@@ -75,3 +75,52 @@ def test_nothing_presses():
     rows, d = drawn(72)
     state = coulomb(rows, np.abs(d), all_stuck(rows))
     assert not state.status.closed.any() or state.lam[: rows.n].min() >= 0
+
+
+# Two tangents ------------------------------------------------------------------------------------
+
+
+def drawn_3d(seed, g=10):
+    rng = np.random.default_rng(seed)
+    A_ = rng.normal(size=(3 * g, 9 * g)) / np.sqrt(9 * g)
+    size = 10 ** rng.uniform(-1, 0, g)
+    scale = np.tile(size, 3)
+    rows = FrictionRows(
+        scale[:, None] * (A_ @ A_.T) * scale,
+        size,
+        np.arange(g),
+        rng.choice([0.1, 0.3, 1.0], g),
+        1.0,
+    )
+    return rows, scale * rng.normal(size=3 * g)
+
+
+def test_drawn_problems_in_3d():
+    for seed in range(60):
+        rows, d = drawn_3d(seed + 808)
+        state = coulomb_3d(rows, d, all_stuck(rows))
+        g, largest = rows.n, np.abs(state.lam).max()
+        shear, slip = state.lam[g:].reshape(2, -1), state.gap[g:].reshape(2, -1)
+        bound = rows.mu * state.lam[:g]
+        assert state.lam[:g].min() >= -1e-12 * largest
+        assert state.gap[:g].min() >= -1e-9 * np.abs(d).max()
+        assert (np.linalg.norm(shear, axis=0) <= bound + 1e-7 * largest).all()
+        size = np.linalg.norm(slip, axis=0)
+        slides = size > 1e-7 * np.abs(d).max()
+        opposed = shear + bound * slip / np.where(slides, size, 1.0)
+        assert np.abs(opposed[:, slides]).max(initial=0.0) <= 1e-6 * largest
+
+
+def test_one_tangent_is_the_problem_of_2d():
+    for seed in range(20):
+        rows, d = drawn_3d(seed + 202)
+        g = rows.n
+        F = rows.F.copy()
+        F[: 2 * g, 2 * g :] = F[2 * g :, : 2 * g] = 0.0
+        d[2 * g :] = 0.0
+        three = FrictionRows(F, rows.measure, rows.rubbing_rows, rows.mu, 1.0)
+        two = FrictionRows(F[: 2 * g, : 2 * g], rows.measure, rows.rubbing_rows, rows.mu, 1.0)
+        expected = coulomb(two, d[: 2 * g], all_stuck(two)).lam
+        lam = coulomb_3d(three, d, all_stuck(three)).lam
+        assert np.abs(lam[: 2 * g] - expected).max() <= 1e-7 * np.abs(expected).max()
+        assert np.abs(lam[2 * g :]).max() <= 1e-9 * np.abs(expected).max()

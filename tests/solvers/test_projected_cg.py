@@ -1,6 +1,7 @@
 """Contact by projected conjugate gradients, against the dense active set and a direct solver."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from xcrack import ConvergenceError
 from xcrack.analysis.multipliers import gap_rows, multipliers
 from xcrack.analysis.solve import build
 from xcrack.fem.loads import load_vector
+from xcrack.linalg import iterative
 from xcrack.linalg.active_set import active_set
 from xcrack.linalg.direct import system
 from xcrack.linalg.engine import ContactRows
@@ -424,3 +426,50 @@ def test_a_tilted_penny_as_with_a_factor(supports, order):
         assert np.abs(gap[: 3 * space.n_nodes]).max() <= 1e-7 * size
         assert np.abs(model.jumps[0] @ gap).max() <= 1e-7 * size
     assert engine.count.iterations <= {1: 70, 2: 120}[order]
+
+
+def exactly(monkeypatch):
+    """Iterate far below the default tolerance."""
+    plain = iterative.conjugate_gradients_steps
+    monkeypatch.setattr(
+        iterative, "conjugate_gradients_steps", lambda K, b, y, t: plain(K, b, y, 1e-4 * t)
+    )
+    monkeypatch.setattr(iterative, "TOLERANCE", 1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("supported", [True, False], ids=["held", "not held"])
+def test_states_as_with_a_factor(monkeypatch, supported):
+    """Open, closed and bent, so that a part is closed: all to 1e-8."""
+    exactly(monkeypatch)
+    pull = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+    problem = xc.Problem(
+        xc.box((-1, -1, -1), (1, 1, 1), 6), xc.Isotropic(E=1.0, nu=0.3),
+        [xc.penny_crack((0.013, -0.021, 0.0317), (0.3, -0.5, 1.0), 0.5)],
+        supports=[xc.fix("bottom")] if supported else [], loads=pull[: 2 - supported],
+    )  # fmt: skip
+    bend = [
+        xc.traction("top", lambda x: np.outer(x[:, 0], (0, 0, 1.0))),
+        xc.traction("bottom", lambda x: np.outer(x[:, 0], (0, 0, -1.0))),
+    ]
+    states = [1.0, -1.0, bend[:1] if supported else bend]
+    result = [
+        xc.solve(replace(problem, numerics=xc.Numerics(linear=linear)), states=states)
+        for linear in ("iterative", "direct")
+    ]
+    closed = []
+    for one, other in zip(*result, strict=True):
+        n = 3 * one.space.n_nodes
+        size = np.abs(other.u[:n]).max()
+        assert np.abs(one.u[:n] - other.u[:n]).max() <= 1e-8 * size
+        assert one.energy == pytest.approx(other.energy, rel=1e-8)
+        wanted = xc.stress_intensity(other).K
+        np.testing.assert_allclose(
+            xc.stress_intensity(one).K, wanted, rtol=0, atol=1e-8 * np.abs(wanted).max()
+        )
+        p, q = (s.contact[0].pressure for s in (one, other))
+        assert np.abs(p - q).max() <= 1e-8 * max(np.abs(q).max(), 1.0)
+        closed.append(other.contact[0].closed.mean())
+    assert closed[0] == 0
+    assert closed[1] == 1
+    assert 0 < closed[2] < 1

@@ -11,7 +11,8 @@ from xcrack.analysis.solve import build
 from xcrack.fem.assembly import boundary_points
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, n_parts, part_numbers, segment_points
-from xcrack.mesh.simplex import conical_rule, simplex_rule
+from xcrack.mesh.kernels.splitting import graded_points
+from xcrack.mesh.simplex import conical_rule, gauss, simplex_rule
 
 
 def moment(powers):
@@ -127,3 +128,31 @@ def test_few_points_are_enough(points):
         return xc.stress_intensity(xc.solve(problem)).K[0]
 
     assert np.abs(K(points) - K(4)).max() <= 1e-5
+
+
+def test_no_point_of_a_short_segment_lies_on_the_tip():
+    """Its end is the tip but for round-off; a part as long as that was added to the rule."""
+    u, w = gauss(6)
+    tip = np.array([[1 / 3, 1 / 3]])
+    for length in 10.0 ** np.arange(-12, 0):
+        for angle in np.linspace(0.0, 2 * np.pi, 41):
+            begin = tip + length * scenes.rows(angle)[:1]
+            end = tip + np.array([[1.1e-16, -1.1e-16]])
+            _, place, weight = graded_points(begin, end, tip, u, w)
+            assert len(weight) == 6
+            assert place[:, 0].min() >= 0.99 * u.min() ** 2
+            assert weight.sum() == pytest.approx(np.linalg.norm(begin - end), rel=1e-12)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-8, 1e-4, 1e-2, 0.3])
+def test_points_are_graded_from_a_tip_beyond_the_end(gap):
+    """The integral of 1/sqrt(r) along a segment that begins a little beside the tip is exact."""
+    u, w = gauss(6)
+    begin, end = np.array([[gap, 0.0]]), np.array([[gap + 1.0, 0.0]])
+    for a, b in ((begin, end), (end, begin)):
+        _, place, weight = graded_points(a, b, np.zeros((1, 2)), u, w)
+        r = (place @ np.concatenate([a, b]))[:, 0]
+        wanted = 2 * (np.sqrt(gap + 1) - np.sqrt(gap))
+        assert weight @ r**-0.5 == pytest.approx(wanted, rel=1e-12)  # round-off
+        assert weight.sum() == pytest.approx(1.0, rel=1e-12)
+        assert weight @ r**2 == pytest.approx(((gap + 1) ** 3 - gap**3) / 3, rel=1e-12)
