@@ -8,7 +8,7 @@ import xcrack as xc
 from fuzz import damage
 from fuzz.kinds import NONSENSE, VALID
 from fuzz.run import PARTS, TABLE, drawn, run, table
-from xcrack import GrowthLaw, Load, Threshold, fix
+from xcrack import GrowthLaw, Load, Threshold
 
 _EXEMPT = {
     **dict.fromkeys(
@@ -38,7 +38,7 @@ _CALLED_BY_XCRACK = {
     "displacement_at",
     "factors",  # of loads that follow the crack
     "scaled",  # K and solutions, by these
-    *(name for kind in (Load, *fix.__bases__, GrowthLaw, Threshold) for name in vars(kind)),
+    *(name for kind in (Load, Load.__base__, GrowthLaw, Threshold) for name in vars(kind)),
 }
 _MADE_BY_XCRACK = ("Solution",)  # by solve, from parts that users do not have
 
