@@ -463,11 +463,52 @@ def test_bad_arms_are_refused_with_the_remedy(name):
 
 
 @pytest.mark.slow
-def test_an_edge_a_third_of_a_cell_from_a_face_is_refused():
-    """Two cracks would run through one cell; half a cell farther they are solved."""
+def test_remedies_for_an_edge_on_a_face_or_close_to_it():
+    """As an arm where it touches; with finer cells where it ends a third of a cell before.
+
+    The closer the edge the more energy: least half a cell away, most as an arm.
+    """
+    edge = upright(0.067)
     with pytest.raises(xc.GeometryError, match="refine the mesh between them"):
-        xc.solve(scene([ONE, upright(0.067)], contact="off"))
-    energy, one = (
-        xc.solve(scene(cracks, contact="off")).energy for cracks in ([ONE, upright(0.12)], [ONE])
+        xc.solve(scene([ONE, edge], contact="off"))
+    coarse = scene([ONE]).mesh
+    finest = float(coarse.cell_size.max()) / 4
+
+    def size(x):
+        is_between = (np.abs(x - (0.013, 0.0, 0.04)) < (0.1, 0.4, 0.1)).all(axis=1)
+        return np.where(is_between, finest, np.inf)
+
+    close = xc.Problem(
+        xc.refine(coarse, size=size), STEEL, [ONE, edge], loads=PULL, order=1, contact="off"
     )
-    assert energy > one
+    touching = [ONE, xc.arm(upright(0.017), 0, side_above(ONE))]
+    energy = [
+        xc.solve(problem).energy
+        for problem in (
+            scene([ONE], contact="off"),
+            scene([ONE, upright(0.12)], contact="off"),
+            close,
+            scene(touching, contact="off"),
+        )
+    ]
+    print(f"\n{energy}")
+    assert (np.diff(energy) > 0).all()
+
+
+@pytest.mark.slow
+def test_the_remedy_for_surfaces_that_lie_on_each_other():
+    """Two discs of one plane as one surface open more than the larger one."""
+    centre, angle = np.array((0.25, 0.0)), np.linspace(0, 2 * np.pi, 241)[:-1]
+    way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    large, small = ((0.013, 0.0), 0.65), ((0.5, 0.0), 0.35)
+    reach = []
+    for middle, radius in (large, small):
+        d = np.array(middle) - centre
+        reach.append(way @ d + np.sqrt((way @ d) ** 2 - d @ d + radius**2))
+    outline = centre + np.max(reach, axis=0)[:, None] * way
+    both = [xc.penny_crack((*middle, 0.017), (0, 0, 1), radius) for middle, radius in (large, small)]
+    with pytest.raises(xc.GeometryError, match="give both as one surface"):
+        xc.solve(scene(both, contact="off"))
+    joined = xc.plane_crack(np.column_stack([outline, np.full(len(outline), 0.017)]))
+    alone, united = (xc.solve(scene([c], contact="off")).energy for c in (both[0], joined))
+    assert united > alone

@@ -2,8 +2,8 @@
 
 Pairs stand at any offset and angle in a cube that is pulled alike from all sides. The line in
 which their planes meet tells what they are: apart; one cut through by the other, which are given
-as one and two arms; or interlocked, each front through the face of the other. No solution is
-foreign: the cracks release at least what the largest penny in one of them would in an infinite
+as one and two arms; or interlocked, each front through the face of the other, which is refused: of
+such a pair one is let reach beyond the other, as the message says. No solution is foreign: the cracks release at least what the largest penny in one of them would in an infinite
 body, to a tenth, and no K is infinite or not a number. Where the mesh is too
 coarse it is refined around the place that the message names, as that asks for. Pairs that grow
 begin apart.
@@ -26,6 +26,7 @@ from xcrack.mesh.locate import Body
 E, NU, PULL = 1e5, 0.3, 100.0
 CELLS = 10  # across the cube of side 2
 FINEST = 0.06  # longest edge of cells to which meshes are refined where a message asks for it
+BEYOND = 0.3  # by which one of an interlocked pair is let reach beyond the other
 GROWING_CELLS = 13  # across the cube of side 2.5
 DA, MOST_STEPS = 0.12, 12
 SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
@@ -116,6 +117,25 @@ def given_as(kind, one, other):
     return [through, xc.arm(ending, 0, 1), xc.arm(ending, 0, -1)]
 
 
+def reaching_beyond(one, other):
+    """A plane crack made larger in its plane, from its far side on, until it passes the other."""
+    along = np.cross(normal_of(one), normal_of(other))
+    along /= np.linalg.norm(along)
+    own, needed = reach(one, other, along), reach(other, one, along)
+    points = one.points
+    for far, near, wanted in (
+        (own[0], own[1], needed[1] + BEYOND),
+        (-own[1], -own[0], BEYOND - needed[0]),
+    ):
+        if wanted < near:
+            continue
+        sign = 1.0 if far == own[0] else -1.0
+        fixed = points[int(np.argmin(sign * points @ along))]
+        factor = (wanted - far) / (near - far)
+        points = fixed + factor * (points - fixed)
+    return xc.surface_crack(points, one.faces)
+
+
 def solved(cracks, mesh):
     """Solution and K of a pair."""
     problem = xc.Problem(mesh, xc.Isotropic(E, NU), cracks, loads=LOADS, order=1, contact="off")
@@ -149,6 +169,11 @@ def solution_after_remedies(cracks):
             if "Leave this arm out" in words and len(cracks) == 3:
                 cracks = [crack for c, crack in enumerate(cracks) if c != int(words.split()[1])]
                 done.append("without an arm that is no cell high")
+                continue
+            if "runs past its front" in words and kind_of(*cracks[:2]) == "interlocked":
+                through, ending = (xc.surface_crack(c.points, c.faces) for c in cracks[:2])
+                cracks = given_as("cut through", reaching_beyond(through, ending), ending)
+                done.append("one let reach beyond the other")
                 continue
             finer = refined_there(mesh, words)
             if finer is None:

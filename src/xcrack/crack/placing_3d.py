@@ -629,8 +629,8 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
                 one, other = (_normal_at(each, meeting[:1]) for each in (cracks[i], crack))
                 if abs(float(one @ other)) > _FLUSH:
                     raise GeometryError(
-                        f"cracks {i} and {j} lie on each other near {at(meeting[0])}: leave out "
-                        "what both share, or give both as one surface."
+                        f"cracks {i} and {j} lie on each other near {at(meeting[0])}: give both "
+                        "as one surface, or leave out one that lies in the other."
                     )
                 raise GeometryError(
                     f"cracks {i} and {j} cross near {at(meeting[0])}: let one of them end on the "

@@ -94,7 +94,7 @@ def _check(
             f"{at(mesh.points[mesh.cells[cell]].mean(axis=0))}: let crack {on} reach two cells or "
             f"more beyond crack {c}, refine the mesh there, or let crack {c} run through and crack "
             f"{on} end on it, an arm for each side on which it lies. Where each runs past the "
-            "front of the other neither helps: end one of them a few cells before."
+            "front of the other only the first helps, or to end one of them a few cells before."
         )
     cells = np.nonzero(is_joined)[0]
     one, other = (_slopes(mesh, cut, cells) for cut in (through_cut, ending))
