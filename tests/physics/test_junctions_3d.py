@@ -506,7 +506,7 @@ def test_the_remedy_for_surfaces_that_lie_on_each_other():
         d = np.array(middle) - centre
         reach.append(way @ d + np.sqrt((way @ d) ** 2 - d @ d + radius**2))
     outline = centre + np.max(reach, axis=0)[:, None] * way
-    both = [xc.penny_crack((*middle, 0.017), (0, 0, 1), radius) for middle, radius in (large, small)]
+    both = [xc.penny_crack((*middle, 0.017), (0, 0, 1), r) for middle, r in (large, small)]
     with pytest.raises(xc.GeometryError, match="give both as one surface"):
         xc.solve(scene(both, contact="off"))
     joined = xc.plane_crack(np.column_stack([outline, np.full(len(outline), 0.017)]))

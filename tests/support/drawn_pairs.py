@@ -3,7 +3,8 @@
 Pairs stand at any offset and angle in a cube that is pulled alike from all sides. The line in
 which their planes meet tells what they are: apart; one cut through by the other, which are given
 as one and two arms; or interlocked, each front through the face of the other, which is refused: of
-such a pair one is let reach beyond the other, as the message says. No solution is foreign: the cracks release at least what the largest penny in one of them would in an infinite
+such a pair one is let reach beyond the other, as the message says. No solution is
+foreign: the cracks release at least what the largest penny in one of them would in an infinite
 body, to a tenth, and no K is infinite or not a number. Where the mesh is too
 coarse it is refined around the place that the message names, as that asks for. Pairs that grow
 begin apart.
