@@ -69,7 +69,11 @@ def segment_points(
 _AT = 1e-9  # share of a sub-cell's size below which a vertex lies on the front
 _FAR = 0.7  # distance to the front, in sizes of the sub-cell, beyond which a rule of degree 2 does
 _TINY = 0.01  # sub-cells below this share of their cell get fewer points
-_NEAR = 0.5  # triangles and sub-cells closer to the front, in their sizes, are cut
+_NEAR = 0.5  # triangles closer to the front, in their sizes, are cut
+# For K: sub-cells closer to the front, in their sizes times the fourth root of their share of the
+# cell, are cut, and those of a smaller share have a rule of degree 2. As exact as the half of the
+# size for all, down to an eighth of a hundredth of the cell, with .7 of its points (measured).
+_NEAR_OF_WHOLE, _LEAST_SHARE = 0.7, 0.002
 _BISECTIONS = 6  # of a sub-cell towards a front at most
 _SAME = 1e-6  # relative difference below which lengths and volumes are equal
 
@@ -142,8 +146,9 @@ def graded_points(
 ) -> tuple[Ints, Floats, Floats]:
     """Points in sub-cells on which tip functions act, for K.
 
-    Those that do not touch a front are bisected towards it, until none is nearer to it than half
-    of its size: the noise of a domain integral is that of its quadrature.
+    Those that do not touch a front are bisected towards it, until none is nearer to it than its
+    size allows, large parts sooner than small ones, which add less to the error: the noise of a
+    domain integral is that of its quadrature.
 
     Parameters
     ----------
@@ -165,8 +170,9 @@ def graded_points(
     number = np.nonzero(is_far)[0]
     bary, share, x, r, size = (each[number] for each in (bary, share, x, r, size))
     parts = []
-    for _ in range(_BISECTIONS):
-        is_near = (r.min(axis=1) < (1 - _SAME) * _NEAR * size) & (share > (1 + _SAME) * _TINY / 8)
+    for level in range(_BISECTIONS + 1):
+        near_size = (1 - _SAME) * _NEAR_OF_WHOLE * np.sqrt(np.sqrt(share)) * size
+        is_near = (r.min(axis=1) < near_size) & (level < _BISECTIONS)
         parts.append((number[~is_near], bary[~is_near], share[~is_near]))
         if not is_near.any():
             break
@@ -174,10 +180,13 @@ def graded_points(
         share = np.concatenate([share[is_near], share[is_near]]) / 2
         bary, x = _halves(space, nodes[number[: len(number) // 2]], bary[is_near], x[is_near])
         r, size = radius_at(space, nodes[number], bary), _longest_edges(x)
-    else:
-        parts.append((number, bary, share))
-    rule = simplex_rule(3, degree)
-    return _all_parts([*swept_parts, *(_rule_points(*part, rule) for part in parts)])
+    number, bary, share = _all_parts(parts)
+    is_small = share < (1 - _SAME) * _LEAST_SHARE
+    plain_parts = [
+        _rule_points(number[rows], bary[rows], share[rows], simplex_rule(3, degree_of_part))
+        for rows, degree_of_part in ((~is_small, degree), (is_small, 2))
+    ]
+    return _all_parts([*swept_parts, *plain_parts])
 
 
 _Parts = tuple[Ints, Floats, Floats]  # sub-cell, vertices or places, share
@@ -213,9 +222,10 @@ def _rule_points(
     number: Ints, corner: Floats, share: Floats, rule: tuple[Floats, Floats]
 ) -> _Parts:
     """Points of a rule in simplices."""
-    place = np.einsum("pv,svb->spb", rule[0], corner)
-    weight = share[:, None] * rule[1]
-    return np.repeat(number, len(rule[1])), place.reshape(-1, corner.shape[2]), weight.ravel()
+    count, width = len(rule[1]), corner.shape[2]
+    place = rule[0] @ corner.transpose(1, 0, 2).reshape(corner.shape[1], -1)
+    place = place.reshape(count, len(corner), width).transpose(1, 0, 2).reshape(-1, width)
+    return np.repeat(number, count), place, (share[:, None] * rule[1]).ravel()
 
 
 def _all_parts(parts: list[_Parts]) -> _Parts:

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.machine import map_tasks
-from xcrack.mesh.triangulation import face_normals, side_keys
+from xcrack.mesh.triangulation import face_normals, face_vectors, side_keys
 
 _AT_ONCE = 8192  # points of one task: the same for any number of threads
 _EQUAL = 1e-14  # share of the surface's extent below which two distances are the same
@@ -110,8 +110,8 @@ def _pseudo_normals(points: Floats, triangles: Ints, normal: Floats) -> tuple[Fl
     _, inverse, count = np.unique(side_keys(triangles), return_inverse=True, return_counts=True)
     inverse = inverse.reshape(-1, 3)
     total = np.zeros((len(count), 3))
-    for side in range(3):
-        np.add.at(total, inverse[:, side], normal)
+    for d in range(3):
+        total[:, d] = np.bincount(inverse.ravel(), np.repeat(normal[:, d], 3), len(count))
     rim_side = count[inverse] == 1
     rim_point = np.zeros(len(points), dtype=bool)
     for side in range(3):
@@ -204,14 +204,15 @@ def surface_distance(
 def corner_normals(points: Floats, triangles: Ints, normal: Floats | None = None) -> Floats:
     """Normals at the points of a surface, weighted by angles, not normalised `(p, 3)`."""
     normal = face_normals(points, triangles) if normal is None else normal
-    corners = points[triangles]
-    result = np.zeros((len(points), 3))
-    for i in range(3):
-        one = corners[:, (i + 1) % 3] - corners[:, i]
-        other = corners[:, (i + 2) % 3] - corners[:, i]
-        sine = np.linalg.norm(np.cross(one, other), axis=1)
-        angle = np.arctan2(sine, np.einsum("ij,ij->i", one, other))
-        np.add.at(result, triangles[:, i], angle[:, None] * normal)
+    corners, vector = points[triangles], face_vectors(points, triangles)
+    sine = np.sqrt(np.einsum("ij,ij->i", vector, vector))  # the same at each corner, times lengths
+    edge = np.roll(corners, -1, axis=1) - corners
+    cosine = -np.einsum("kid,kid->ki", edge, np.roll(edge, 1, axis=1))
+    angle = np.arctan2(sine[:, None], cosine)
+    result = np.empty((len(points), 3))
+    for d in range(3):
+        share = (angle * normal[:, d : d + 1]).ravel()
+        result[:, d] = np.bincount(triangles.ravel(), share, len(points))
     return result
 
 

@@ -127,7 +127,9 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     is_inside = partial(inside_body, space.cracks, tip.crack, space.mesh)
     rows_inside = np.nonzero(is_inside(np.array(tip.x)))[0]
     first, last = (0, len(tip.x)) if is_closed else part_inside(tip.x, rows_inside, is_inside)
-    curve = front_curve(tip.x[first:last], tip.frame[first:last], is_closed)
+    curve = whole_curve
+    if last - first < len(tip.x):
+        curve = front_curve(tip.x[first:last], tip.frame[first:last], is_closed)
     curve = replace(curve, is_cut=_cut_ends(solutions[0], t, curve))
     s = curve.breaks[rows_inside - first]
     x, frame, _ = curve.at(s)

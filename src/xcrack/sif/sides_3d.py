@@ -109,7 +109,8 @@ def _boundary_around(
     corner = mesh.points[facets]
     middle = corner.mean(axis=1)
     size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
-    facets = facets[curve.distance(middle, reach + 2 * float(size.max())) <= reach + 2 * size]
+    # The distance to a sample of the front may be a little more than that to the front.
+    facets = facets[curve.distance(middle, reach + 2 * float(size.max())) <= reach + 1.2 * size]
     if not len(facets):
         return None
     points, normal = facet_points(space, facets, halvings=_HALVINGS)

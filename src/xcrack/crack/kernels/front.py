@@ -8,18 +8,26 @@ from xcrack.base.kernels.jit import kernel
 
 
 @kernel
-def _curve_at(s, break_arcs, place, value, slope, bend):  # type: ignore[no-untyped-def]
-    """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first.
-
-    Straight beyond its ends.
-    """
+def _piece_of(s, break_arcs, guess):  # type: ignore[no-untyped-def]
+    """Piece of a spline in which a parameter lies, first or last beyond its ends."""
     low, high = 0, len(break_arcs) - 2
+    if break_arcs[guess] <= s < break_arcs[guess + 1]:
+        return guess
     while low < high:
         middle = (low + high + 1) // 2
         if break_arcs[middle] <= s:
             low = middle
         else:
             high = middle - 1
+    return low
+
+
+@kernel
+def _curve_at(s, low, break_arcs, place, value, slope, bend):  # type: ignore[no-untyped-def]
+    """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first.
+
+    Straight beyond its ends.
+    """
     clamped_s = min(max(s, break_arcs[0]), break_arcs[-1])
     t, excess = clamped_s - break_arcs[low], s - clamped_s
     for i in range(3):
@@ -58,9 +66,11 @@ def frames_at(s, break_arcs, place, normal):  # type: ignore[no-untyped-def]
     turn = np.empty((count, 4))
     dx, ddx = np.empty(3), np.empty(3)
     N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
+    piece = 0
     for q in range(count):
-        _curve_at(s[q], break_arcs, place, x[q], dx, ddx)
-        _curve_at(s[q], break_arcs, normal, N, dN, ddN)
+        piece = _piece_of(s[q], break_arcs, piece)
+        _curve_at(s[q], piece, break_arcs, place, x[q], dx, ddx)
+        _curve_at(s[q], piece, break_arcs, normal, N, dN, ddN)
         _frame(dx, ddx, N, dN, frame[q], turn[q])
     return x, frame, turn
 
@@ -126,10 +136,12 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
     N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
     first, last = break_arcs[0], break_arcs[-1]
     period = last - first
+    piece = 0
     for q in range(count):
         u = start[q]
         for _ in range(30):
-            _curve_at(u, break_arcs, place, X, dX, ddX)
+            piece = _piece_of(u, break_arcs, piece)
+            _curve_at(u, piece, break_arcs, place, X, dX, ddX)
             f, df, square = 0.0, 0.0, 0.0
             for i in range(3):
                 gap = x[q, i] - X[i]
@@ -137,7 +149,8 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
                 square += dX[i] * dX[i]
                 df += gap * ddX[i]
             df = square - df
-            step = f / (df if df > 0.1 * square else square)
+            is_newton = df > 0.1 * square
+            step = f / (df if is_newton else square)
             step = min(max(step, -reach), reach)
             previous_u = u
             u += step
@@ -146,10 +159,12 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
                     u += period
                 elif u > last:
                     u -= period
-            if abs(step) <= 1e-14 * period or u == previous_u:
+            # A step of Newton's leaves about its square.
+            if abs(step) <= (1e-9 if is_newton else 1e-14) * period or u == previous_u:
                 break
-        _curve_at(u, break_arcs, place, X, dX, ddX)
-        _curve_at(u, break_arcs, normal, N, dN, ddN)
+        piece = _piece_of(u, break_arcs, piece)
+        _curve_at(u, piece, break_arcs, place, X, dX, ddX)
+        _curve_at(u, piece, break_arcs, normal, N, dN, ddN)
         _frame(dX, ddX, N, dN, frame[q], turn[q])
         s[q] = u
         x1, x2 = 0.0, 0.0
@@ -166,11 +181,13 @@ def _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend
     """Field of Williams of one mode, and more, from the cosine and sine of half the angle.
 
     U (t, n, b), its gradient G along t, n; d/dtheta: turned, spin; d/dx1: slope (of turned), bend.
+    Components that a mode does not have are left as they are.
     """
     c, s = ch * ch - sh * sh, 2.0 * sh * ch
     c3, s3 = ch * c - sh * s, sh * c + ch * s
     root = math.sqrt(r)
-    for i in range(3):
+    to_slope, to_bend = 1.0 / root, -1.0 / (root * r)
+    for i in range(2 if mode == 2 else 0, 3 if mode == 2 else 2):
         a = b = e = d = 0.0  # of cos, sin of theta / 2, then of 3 theta / 2
         if mode == 0 and i == 0:
             a, e = kolosov - 0.5, -0.5
@@ -190,11 +207,11 @@ def _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend
         p0, p1 = 0.5 * g * c - g1 * s, 0.5 * g * s + g1 * c
         d0 = -0.5 * (g1 * c + g * s) - g2 * s
         d1 = 0.5 * (g * c - g1 * s) + g2 * c
-        G[i, 0], G[i, 1] = p0 / root, p1 / root
-        slope[i] = (0.5 * g1 * c - g2 * s) / root
-        spin[i, 0], spin[i, 1] = d0 / root, d1 / root
-        bend[i, 0] = -(0.5 * p0 * c + d0 * s) / (root * r)
-        bend[i, 1] = -(0.5 * p1 * c + d1 * s) / (root * r)
+        G[i, 0], G[i, 1] = p0 * to_slope, p1 * to_slope
+        slope[i] = (0.5 * g1 * c - g2 * s) * to_slope
+        spin[i, 0], spin[i, 1] = d0 * to_slope, d1 * to_slope
+        bend[i, 0] = (0.5 * p0 * c + d0 * s) * to_bend
+        bend[i, 1] = (0.5 * p1 * c + d1 * s) * to_bend
 
 
 @kernel
@@ -277,8 +294,8 @@ def front_terms(  # type: ignore[no-untyped-def]
     states = gradient.shape[3]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
-    U, U_turn, slope = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    G, spin, bend = np.empty((3, 3, 2)), np.empty((3, 3, 2)), np.empty((3, 3, 2))
+    U, U_turn, slope = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((3, 3, 2))
     S, dS = np.empty((3, 3, 3)), np.empty((3, 3))
     X, X1, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     g, sigma = np.empty((3, 3)), np.empty((3, 3))
@@ -298,7 +315,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         kt, kn, w = turn[q, 0], turn[q, 1], turn[q, 2]
         if not is_curved:
             kt = kn = w = 0.0
-        hs = 1.0 - r * (kt * c + kn * s)
+        per_hs = 1.0 / (1.0 - r * (kt * c + kn * s))
         for side in range(2):
             part = share[q] if side == 1 else 1.0 - share[q]
             rise = step[q] if side == 1 else -step[q]
@@ -313,14 +330,14 @@ def front_terms(  # type: ignore[no-untyped-def]
             )
             _unit_stress(G[m], lam, mu, S[m])
             _unit_stress(spin[m], lam, mu, dS)
-            X[m, 0] = (kt * U[m, 2] - w * (U[m, 1] + U_turn[m, 0])) / hs
-            X[m, 1] = (kn * U[m, 2] + w * (U[m, 0] - U_turn[m, 1])) / hs
-            X[m, 2] = -(kt * U[m, 0] + kn * U[m, 1] + w * U_turn[m, 2]) / hs
-            X1[m, 0] = (kt * G[m, 2, 0] - w * (G[m, 1, 0] + slope[m, 0])) / hs
-            X1[m, 1] = (kn * G[m, 2, 0] + w * (G[m, 0, 0] - slope[m, 1])) / hs
-            X1[m, 2] = -(kt * G[m, 0, 0] + kn * G[m, 1, 0] + w * slope[m, 2]) / hs
+            X[m, 0] = (kt * U[m, 2] - w * (U[m, 1] + U_turn[m, 0])) * per_hs
+            X[m, 1] = (kn * U[m, 2] + w * (U[m, 0] - U_turn[m, 1])) * per_hs
+            X[m, 2] = -(kt * U[m, 0] + kn * U[m, 1] + w * U_turn[m, 2]) * per_hs
+            X1[m, 0] = (kt * G[m, 2, 0] - w * (G[m, 1, 0] + slope[m, 0])) * per_hs
+            X1[m, 1] = (kn * G[m, 2, 0] + w * (G[m, 0, 0] - slope[m, 1])) * per_hs
+            X1[m, 2] = -(kt * G[m, 0, 0] + kn * G[m, 1, 0] + w * slope[m, 2]) * per_hs
             for i in range(3):
-                X1[m, i] += X[m, i] * kt / hs
+                X1[m, i] += X[m, i] * kt * per_hs
                 D[m, i] = -w * dS[i, 2] - kt * S[m, i, 0] - kn * S[m, i, 1]
             D[m, 0] += kt * S[m, 2, 2] - w * S[m, 1, 2]
             D[m, 1] += kn * S[m, 2, 2] + w * S[m, 0, 2]
@@ -329,7 +346,7 @@ def front_terms(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     D[m, i] += slopes[q] * S[m, i, 2]
             for i in range(3):
-                D[m, i] /= hs
+                D[m, i] *= per_hs
         for n in range(states):
             _into_frame(frame[q], gradient[q, :, :, n], g)
             trace = lam * (g[0, 0] + g[1, 1] + g[2, 2])
@@ -355,7 +372,7 @@ def front_terms(  # type: ignore[no-untyped-def]
                     volume += S1[i, 0] * bend[m, i, 0] + S1[i, 1] * bend[m, i, 1]
                 p0 -= W
                 p22 -= W
-                volume += (w * p12 - kt * p22) / hs
+                volume += (w * p12 - kt * p22) * per_hs
                 if len(force) > 0:
                     for a in range(3):
                         f = 0.0
@@ -363,7 +380,7 @@ def front_terms(  # type: ignore[no-untyped-def]
                             f += frame[q, a, i] * force[q, i, n]
                         volume -= f * G[m, a, 0]
                 along_radius = p0 * c + p1 * s
-                along_front = p2 / hs / turn[q, 3]
+                along_front = p2 * per_hs / turn[q, 3]
                 for side in range(2):
                     for k in range(domains):
                         result[n, k, m, hat[q, side]] += (
@@ -400,8 +417,9 @@ def surface_terms(  # type: ignore[no-untyped-def]
     states = traction.shape[2]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
-    U, U_turn, slope = np.empty(3), np.empty(3), np.empty(3)
-    G, spin, bend, S = np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 2)), np.empty((3, 3))
+    U, U_turn, slope = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
+    G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((3, 3, 2))
+    S = np.empty((3, 3))
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(len(weight)):
         r = polar[q, 0]
@@ -413,15 +431,18 @@ def surface_terms(  # type: ignore[no-untyped-def]
                 m_out[a] += frame[q, a, i] * outward_normal[q, i]
         ch, sh = math.cos(0.5 * polar[q, 1]), math.sin(0.5 * polar[q, 1])
         for mode in range(3):
-            _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend)
-            _unit_stress(G, lam, mu, S)
+            _unit_field(
+                mode, r, ch, sh, kolosov, scale, U[mode], U_turn[mode], G[mode], slope[mode],
+                spin[mode], bend[mode],
+            )  # fmt: skip
+            _unit_stress(G[mode], lam, mu, S)
             for n in range(states):
                 density = 0.0
                 for a in range(3):
                     t[a] = 0.0
                     for i in range(3):
                         t[a] += frame[q, a, i] * traction[q, i, n]
-                    density += t[a] * G[a, 0]
+                    density += t[a] * G[mode, a, 0]
                 if len(gradient) > 0:
                     _into_frame(frame[q], gradient[q, :, :, n], g)
                     for a in range(3):
@@ -436,7 +457,7 @@ def surface_terms(  # type: ignore[no-untyped-def]
                             sigma[a, b] += mu * (g[a, b] + g[b, a])
                             density += S[a, b] * m_out[b] * g[a, 0]
                         sigma[a, a] += trace
-                        W += sigma[a, 0] * G[a, 0] + sigma[a, 1] * G[a, 1]
+                        W += sigma[a, 0] * G[mode, a, 0] + sigma[a, 1] * G[mode, a, 1]
                     density -= W * m_out[0]
                 for side in range(2):
                     part = share[q] if side == 1 else 1.0 - share[q]

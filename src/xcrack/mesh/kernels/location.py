@@ -287,6 +287,13 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _square_distance(p, q, r, points, i):  # type: ignore[no-untyped-def]
+    """Square of the distance of (p, q, r) to one of the points in 3D."""
+    a, b, c = p - points[i, 0], q - points[i, 1], r - points[i, 2]
+    return a * a + b * b + c * c
+
+
+@kernel
 def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
     """Nearest vertex of a polyline to each point.
 
@@ -296,8 +303,8 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    x : (n, d) array
-    vertices : (p, d) array
+    x : (n, 3) array
+    vertices : (p, 3) array
     bound : float
         Points farther than this from all vertices have none.
 
@@ -308,37 +315,32 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
     distance : (n,) array
         inf where there is none.
     """
-    n, count, dim = len(x), len(vertices), x.shape[1]
-    each = max(1, int(0.6 * math.sqrt(count)))
+    n, count = len(x), len(vertices)
+    each = max(1, int(0.8 * math.sqrt(count)))
     stretches = (count + each - 1) // each
-    middle, reach = np.empty((stretches, dim)), np.zeros(stretches)
+    middle, reach = np.empty((stretches, 3)), np.zeros(stretches)
     for b in range(stretches):
         first, end = b * each, min(count, (b + 1) * each)
-        for j in range(dim):
+        for j in range(3):
             middle[b, j] = vertices[(first + end) // 2, j]
         for v in range(first, end):
-            square = 0.0
-            for j in range(dim):
-                square += (vertices[v, j] - middle[b, j]) ** 2
+            square = _square_distance(middle[b, 0], middle[b, 1], middle[b, 2], vertices, v)
             reach[b] = max(reach[b], math.sqrt(square) * (1.0 + 1e-12))
     nearest, distance = np.full(n, -1, np.int64), np.full(n, np.inf)
     start = 0
     for i in range(n):
+        p, q, r = x[i, 0], x[i, 1], x[i, 2]
         best, smallest, where = bound, bound * bound, -1
         for k in range(-1, stretches):
             b = start if k < 0 else k
             if k == start:
                 continue
-            square = 0.0
-            for j in range(dim):
-                square += (x[i, j] - middle[b, j]) ** 2
+            square = _square_distance(p, q, r, middle, b)
             if square >= (best + reach[b]) ** 2:
                 continue
             is_closer = False
             for v in range(b * each, min(count, (b + 1) * each)):
-                square = 0.0
-                for j in range(dim):
-                    square += (x[i, j] - vertices[v, j]) ** 2
+                square = _square_distance(p, q, r, vertices, v)
                 if square < smallest:
                     smallest, where, is_closer = square, v, True
             if is_closer:

@@ -8,28 +8,41 @@ LEAF = 4  # boxes a leaf of the tree
 
 
 @kernel
-def _sort(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-def]
-    """Sort a stretch of the items by the middles of their boxes, equal ones by number (Shell).
+def _is_before(item, other, lower, upper, axis):  # type: ignore[no-untyped-def]
+    """Whether the middle of a box comes before that of another one; equal ones by number."""
+    a, b = lower[item, axis] + upper[item, axis], lower[other, axis] + upper[other, axis]
+    return a < b or (a == b and item < other)
 
-    numba's own sorts take longer to compile than all of the tree.
+
+@kernel
+def _halve(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-def]
+    """Exchange a stretch of items until none before its middle is behind one from there on.
+
+    Hoare's selection: no half is sorted, so that all of the tree takes the time of one sort.
     """
-    gap = 1
-    while 3 * gap + 1 < last - first:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for place in range(first + gap, last):
-            item = order[place]
-            key = lower[item, axis] + upper[item, axis]
-            at = place
-            while at >= first + gap:
-                other = order[at - gap]
-                rival = lower[other, axis] + upper[other, axis]
-                if rival < key or (rival == key and other < item):
-                    break
-                order[at] = other
-                at -= gap
-            order[at] = item
-        gap //= 3
+    half, last = (first + last) // 2, last - 1
+    while first < last:
+        a, b, pivot = order[first], order[last], order[(first + last) // 2]
+        low, high = (a, b) if _is_before(a, b, lower, upper, axis) else (b, a)
+        if _is_before(pivot, low, lower, upper, axis):
+            pivot = low
+        elif _is_before(high, pivot, lower, upper, axis):
+            pivot = high
+        i, j = first, last
+        while i <= j:
+            while _is_before(order[i], pivot, lower, upper, axis):
+                i += 1
+            while _is_before(pivot, order[j], lower, upper, axis):
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i, j = i + 1, j - 1
+        if half <= j:
+            last = j
+        elif half >= i:
+            first = i
+        else:
+            break
 
 
 @kernel
@@ -76,7 +89,7 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
                 width, axis = middle_high - middle_low, d
         node[at, 0] = -1
         if last - first > LEAF:
-            _sort(order, first, last, lower, upper, axis)
+            _halve(order, first, last, lower, upper, axis)
             half = (first + last) // 2
             node[at, 0] = nodes_in_use
             node[nodes_in_use, 1], node[nodes_in_use, 2] = first, half
