@@ -48,7 +48,7 @@ def check_law(
     >>> from xcrack.fatigue.power import paris
     >>> check_law(paris(C=1e-11, m=3))
     """
-    wrong: list[str] = []
+    faults: list[str] = []
     ratios = [-2.0, -1.0, -0.3, -1e-9] if getattr(law, "ratio", None) == "nominal" else []
     ratios = [R for R in [*ratios, *_RATIOS] if _is_within(R, getattr(law, "R_range", None))]
     if not ratios:
@@ -60,33 +60,33 @@ def check_law(
     def law_of_user(dK: Floats, R: Floats) -> Floats:
         return law(dK, R, **law_needs(law, dK, R, size[: len(dK)]))
 
-    rate = _call_law(law_of_user, (dK, R), wrong, "da/dN")
+    rate = _call_law(law_of_user, (dK, R), faults, "da/dN")
     if rate is not None:
         if rate.shape != dK.shape:
-            wrong.append(f"for {len(dK)} points it returns shape {rate.shape}, not {dK.shape}")
+            faults.append(f"for {len(dK)} points it returns shape {rate.shape}, not {dK.shape}")
         else:
-            _check_rates(law_of_user, dK, R, rate, wrong)
-    _judge("law", law, wrong)
+            _check_rates(law_of_user, dK, R, rate, faults)
+    _judge("law", law, faults)
 
 
 def _is_within(R: float, bounds: tuple[float, float] | None) -> bool:
     return bounds is None or bounds[0] <= R <= bounds[1]
 
 
-def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]) -> None:
+def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, faults: list[str]) -> None:
     is_missing = np.isnan(rate)
     if is_missing.any():
         i = int(np.argmax(is_missing))
-        wrong.append(f"da/dN = {rate[i]} for dK_eq = {dK[i]}, R = {R[i]}: it must be a number")
+        faults.append(f"da/dN = {rate[i]} for dK_eq = {dK[i]}, R = {R[i]}: it must be a number")
         return
     if (rate < 0).any():
         i = int(np.argmin(rate))
-        wrong.append(
+        faults.append(
             f"da/dN = {rate[i]} < 0 for dK_eq = {dK[i]}, R = {R[i]}: no crack shrinks; return inf "
             "where the toughness is reached"
         )
     if (rate[dK == 0] != 0).any():
-        wrong.append("da/dN is not 0 for dK_eq = 0: a crack without load would grow")
+        faults.append("da/dN is not 0 for dK_eq = 0: a crack without load would grow")
     largest = np.abs(rate[np.isfinite(rate)]).max(initial=0.0)
     table = rate.reshape(9, -1)
     n = table.shape[1]
@@ -94,16 +94,18 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, wrong: list[str]
     falls = table[1:] < np.where(np.isinf(table[:-1]), np.inf, table[:-1] - _ROUND_OFF * largest)
     if falls.any():
         i, j = np.argwhere(falls)[0]
-        wrong.append(
+        faults.append(
             f"da/dN falls when dK_eq grows from {dK[n * i]} to {dK[n * i + n]} at R = {R[j]}"
         )
-    alone = [_call_law(law, (dK[i : i + 1], R[i : i + 1]), wrong, "da/dN") for i in range(len(dK))]
-    if any(one is None or one.size != 1 for one in alone):
-        wrong.append("for one point it does not return one rate")
+    single_rates = [
+        _call_law(law, (dK[i : i + 1], R[i : i + 1]), faults, "da/dN") for i in range(len(dK))
+    ]
+    if any(one is None or one.size != 1 for one in single_rates):
+        faults.append("for one point it does not return one rate")
         return
-    one = np.array([each.reshape(-1)[0] for each in alone])
+    one = np.array([each.reshape(-1)[0] for each in single_rates])
     if not np.allclose(one, rate, rtol=_ROUND_OFF, atol=0):
-        wrong.append(
+        faults.append(
             "a point alone gets another rate than among others: each must stand for itself"
         )
 
@@ -135,70 +137,72 @@ def check_criterion(
     >>> from xcrack.fatigue.criteria import weighted_angle
     >>> check_criterion(weighted_angle)
     """
-    wrong: list[str] = []
+    faults: list[str] = []
     for modes in (2, 3):
-        _check_modes(criterion, nu, modes, wrong)
-        if wrong:
+        _check_modes(criterion, nu, modes, faults)
+        if faults:
             break
-    _judge("criterion", criterion, wrong)
+    _judge("criterion", criterion, faults)
 
 
-def _check_modes(criterion: Criterion, nu: float, modes: int, wrong: list[str]) -> None:
+def _check_modes(criterion: Criterion, nu: float, modes: int, faults: list[str]) -> None:
     generator = np.random.default_rng(68712)
     K = generator.uniform(-0.4, 0.4, (3, 7, modes))
     K[..., 0] = generator.uniform(0.5, 1.5, (3, 7))
-    first = _answer_of(criterion, K, nu, wrong)
+    first = _answer_of(criterion, K, nu, faults)
     if first is None:
         return
     angle, dK, R = first
     if (dK < 0).any():
-        wrong.append(f"dK_eq = {dK.min()} is negative")
+        faults.append(f"dK_eq = {dK.min()} is negative")
     if (R < 0).any() or (R > 1).any():
-        wrong.append(f"R = {R} is not in [0, 1]")
+        faults.append(f"R = {R} is not in [0, 1]")
     if (np.abs(angle) >= np.pi).any():
-        wrong.append(f"angle = {angle} is beyond ±π: it is in rad, positive towards the normal")
+        faults.append(f"angle = {angle} is beyond ±π: it is in rad, positive towards the normal")
     mirror = np.array([1.0, -1.0, -1.0])[:modes]
-    unloaded = np.zeros_like(K)
-    closed, negative = K.copy(), K.copy()
-    closed[0, :, 0], negative[0, :, 0] = 0.0, -0.5
-    at_closed = _answer_of(criterion, closed, nu, wrong)
+    no_K = np.zeros_like(K)
+    closed, negative_K = K.copy(), K.copy()
+    closed[0, :, 0], negative_K[0, :, 0] = 0.0, -0.5
+    at_closed = _answer_of(criterion, closed, nu, faults)
     same_modes = {
         "states in another order": (K[::-1], (angle, dK, R)),
         "four times the load": (4 * K, (angle, 4 * dK, R)),
         "K_II and K_III reversed": (K * mirror, (-angle, dK, R)),
         "front points in another order": (K[:, ::-1], (angle[::-1], dK[::-1], R[::-1])),
-        "no load": (unloaded, (0 * angle, 0 * dK, 0 * R)),
+        "no load": (no_K, (0 * angle, 0 * dK, 0 * R)),
     }
     if at_closed is not None:
-        same_modes["a state with K_I < 0 instead of 0"] = (negative, at_closed)
-    for what, (changed, expected) in same_modes.items():
-        answer = _answer_of(criterion, changed, nu, wrong)
+        same_modes["a state with K_I < 0 instead of 0"] = (negative_K, at_closed)
+    for what, (changed_K, expected_answer) in same_modes.items():
+        answer = _answer_of(criterion, changed_K, nu, faults)
         if answer is None:
             return
-        for name, got, want in zip(("angle", "dK_eq", "R"), answer, expected):
-            if not np.allclose(got, want, rtol=_ROUND_OFF, atol=_ROUND_OFF):
-                i = int(np.argmax(np.abs(got - want)))
-                wrong.append(f"{what}: {name} is {got[i]:.6g}, it should be {want[i]:.6g}")
+        for name, value, expected_value in zip(("angle", "dK_eq", "R"), answer, expected_answer):
+            if not np.allclose(value, expected_value, rtol=_ROUND_OFF, atol=_ROUND_OFF):
+                i = int(np.argmax(np.abs(value - expected_value)))
+                faults.append(
+                    f"{what}: {name} is {value[i]:.6g}, it should be {expected_value[i]:.6g}"
+                )
 
 
 def _answer_of(
-    criterion: Criterion, K: Floats, nu: float, wrong: list[str]
+    criterion: Criterion, K: Floats, nu: float, faults: list[str]
 ) -> tuple[Floats, Floats, Floats] | None:
-    answer: Any = _call_law(lambda values: criterion(values, nu), (K,), wrong, None)
+    answer: Any = _call_law(lambda values: criterion(values, nu), (K,), faults, None)
     if answer is None:
         return None
     if not isinstance(answer, tuple) or len(answer) != 3:
-        wrong.append(f"it must return a tuple (angle, dK_eq, R), not {type(answer).__name__}")
+        faults.append(f"it must return a tuple (angle, dK_eq, R), not {type(answer).__name__}")
         return None
     parts = []
     for name, part in zip(("angle", "dK_eq", "R"), answer):
         try:
             values = numbers(part, name, must_be_finite=False)
         except ProblemError as error:
-            wrong.append(str(error))
+            faults.append(str(error))
             return None
         if values.shape != (K.shape[1],) or not np.isfinite(values).all():
-            wrong.append(
+            faults.append(
                 f"{name} for K of shape {K.shape} must be finite, of shape ({K.shape[1]},): "
                 f"it is {values}, of shape {values.shape}"
             )
@@ -208,36 +212,36 @@ def _answer_of(
 
 
 def _call_law(
-    function: Callable[..., Any], arguments: tuple[Floats, ...], wrong: list[str], name: str | None
+    function: Callable[..., Any], arguments: tuple[Floats, ...], faults: list[str], name: str | None
 ) -> Any:
     """Answer of a function that must neither fail nor change its arguments."""
     import warnings
 
-    given = [np.array(a) for a in arguments]
+    argument_copies = [np.array(a) for a in arguments]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            answer = function(*given)
+            answer = function(*argument_copies)
         except Exception as error:
             shapes = ", ".join(str(a.shape) for a in arguments)
-            wrong.append(f"called with arrays of shape {shapes} it raises {value_text(error)}")
+            faults.append(f"called with arrays of shape {shapes} it raises {value_text(error)}")
             return None
-    if not all(np.array_equal(a, b) for a, b in zip(given, arguments)):
-        wrong.append("it changes the arrays it is given: work on a copy")
+    if not all(np.array_equal(a, b) for a, b in zip(argument_copies, arguments)):
+        faults.append("it changes the arrays it is given: work on a copy")
     if name is None:
         return answer
     try:
         return numbers(answer, name, must_be_finite=False)
     except ProblemError as error:
-        wrong.append(str(error))
+        faults.append(str(error))
         return None
 
 
-def _judge(kind: str, function: object, wrong: list[str]) -> None:
-    if wrong:
+def _judge(kind: str, function: object, faults: list[str]) -> None:
+    if faults:
         name = getattr(function, "__name__", None) or value_text(function)
         raise ProblemError(
-            f"the {kind} {name} cannot be used:\n- " + "\n- ".join(dict.fromkeys(wrong))
+            f"the {kind} {name} cannot be used:\n- " + "\n- ".join(dict.fromkeys(faults))
         )
 
 

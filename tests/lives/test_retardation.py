@@ -54,7 +54,7 @@ def cycles_through(length, K, law, model, overload):
     nodes, x = np.zeros((1, 1)), np.linspace(0, length, POINTS)[:, None]
     order = np.zeros(1, dtype=np.int64)
     grown = march(law, model, order, cycles, nodes, x, zones, length, exponent=3.0)
-    assert grown.reached == length
+    assert grown.grown_length == length
     return grown.cycles[-1]
 
 

@@ -27,7 +27,7 @@ def report(
     motion: Motion,
     imbalance: float,
     n_states: int,
-    unbalanced: float | None,
+    unbalanced_share: float | None,
 ) -> Report:
     """The plan of a problem, completed by what its solution took.
 
@@ -42,7 +42,7 @@ def report(
     imbalance : float
         Share of the loads that was out of balance.
     n_states : int
-    unbalanced : float or None
+    unbalanced_share : float or None
         Share of the energy of an initial stress that relaxes without any crack.
     """
     d = model.space.dim
@@ -94,8 +94,9 @@ def report(
             for junction in problem.junctions
         ]
         rows.append(Ingredient("ends on other cracks", True, ", ".join(where)))
-    if unbalanced is not None:
-        reason = f"{unbalanced:.2%} of its energy is out of balance: it relaxes without any crack"
+    if unbalanced_share is not None:
+        share = f"{unbalanced_share:.2%}"
+        reason = f"{share} of its energy is out of balance: it relaxes without any crack"
         rows.append(Ingredient("initial stress", True, reason))
     if engine.reason:
         rows.append(Ingredient("linear solver", True, engine.reason))

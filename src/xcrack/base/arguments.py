@@ -230,18 +230,18 @@ class FilePath(Rule):
 class Array(Rule):
     """An array of finite numbers of a shape, None where any length will do; kept read-only.
 
-    With `hashable` it is kept as nested tuples of float.
+    With `is_hashable` it is kept as nested tuples of float.
     """
 
     shape: tuple[int | None, ...] | None = None
     unit: Unit = field(default=NUMBER, kw_only=True)
     is_whole: bool = False
-    hashable: bool = False
+    is_hashable: bool = False
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """A read-only copy."""
         result = (whole_numbers if self.is_whole else numbers)(value, what, self.shape, error=error)
-        return _tuples(result.tolist()) if self.hashable else frozen_copy(result)
+        return _tuples(result.tolist()) if self.is_hashable else frozen_copy(result)
 
 
 @dataclass(frozen=True, repr=False)

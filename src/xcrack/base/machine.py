@@ -140,20 +140,20 @@ class _Blas:
         every = threadpoolctl.ThreadpoolController().select(user_api="blas")
         self.libraries = every.lib_controllers
         self.lock, self.users = Lock(), 0
-        self.before: list[int | None] = []
+        self.counts_before: list[int | None] = []
 
     def enter(self) -> None:
         with self.lock:
             if self.users == 0:
-                self.before = [library.get_num_threads() for library in self.libraries]
-                self._set(1, self.before)
+                self.counts_before = [library.get_num_threads() for library in self.libraries]
+                self._set(1, self.counts_before)
             self.users += 1
 
     def leave(self) -> None:
         with self.lock:
             self.users -= 1
             if self.users == 0:
-                self._set(None, self.before)
+                self._set(None, self.counts_before)
 
     def _set(self, target_number: int | None, numbers_before: Sequence[int | None]) -> None:
         """Let libraries that had other numbers of threads use a number, or what they had."""

@@ -212,8 +212,8 @@ def under_holes(points: Floats, faces: Ints, outline: TraceOutline, body: Body) 
     middle = (x + np.roll(x, -1, axis=0)) / 2
     for run in runs_of(~outline.is_inside):
         if len(run) < len(x) and outline.candidate[run].all():
-            outward = _outward_directions(points, faces, outline.loop)[0][run]
-            place_ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward
+            outward_direction = _outward_directions(points, faces, outline.loop)[0][run]
+            place_ahead = middle[run] + body.cell_size(middle[run])[:, None] * outward_direction
             depth = body.depth(np.concatenate([middle[run], place_ahead]))[0]
             result[run] = (depth < 0).all()
     return result

@@ -108,9 +108,9 @@ class Crack:
         x, frame = self._tips_and_frames
         begin = self.points[[1 if tip == 0 else tip - 1 for tip in self.tips or ()]]
         along = x - begin
-        (ahead, up), (back, down) = frame.transpose(1, 2, 0)
+        (ahead_x, ahead_y), (normal_x, normal_y) = frame.transpose(1, 2, 0)
         length, direction = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
-        hand = np.sign(ahead * down - up * back)
+        hand = np.sign(ahead_x * normal_y - ahead_y * normal_x)
         return x, lock(begin), lock(length), lock(direction), lock(hand)
 
     def __repr__(self) -> str:

@@ -50,8 +50,8 @@ def last_faces(cracks: Sequence[Crack]) -> Faces:
     """The last faces of all tips of placed cracks."""
     if len(cracks) == 1:
         return Faces(*cracks[0]._last_faces)
-    none = [np.zeros((0, 2))] * 2 + [np.zeros(0)] * 3
-    parts = zip(none, *(crack._last_faces for crack in cracks), strict=True)
+    no_faces = [np.zeros((0, 2))] * 2 + [np.zeros(0)] * 3
+    parts = zip(no_faces, *(crack._last_faces for crack in cracks), strict=True)
     return Faces(*map(np.concatenate, parts))
 
 

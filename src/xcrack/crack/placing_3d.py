@@ -138,10 +138,10 @@ def _arc(x: Floats, s: Floats, i: int, reach: float, half: float) -> Floats:
     # Equal angles in the parameter of the circle.
     angle = np.linspace(-half, half, n + 1)
     t = 0.5 * (1 + np.tan(angle / 2) / np.tan(half / 2))
-    one, two, three = (1 - t) ** 2, 2 * np.cos(half) * t * (1 - t), t**2
-    weight = one + two + three
+    weight_a, weight_x, weight_b = (1 - t) ** 2, 2 * np.cos(half) * t * (1 - t), t**2
+    weight = weight_a + weight_x + weight_b
     return np.asarray(
-        (one[:, None] * a + two[:, None] * x[i] + three[:, None] * b) / weight[:, None]
+        (weight_a[:, None] * a + weight_x[:, None] * x[i] + weight_b[:, None] * b) / weight[:, None]
     )
 
 

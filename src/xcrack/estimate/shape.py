@@ -134,9 +134,9 @@ class GapChanges:
 
 def gap_changes(
     solutions: Sequence[Solution],
-    estimated: Estimate,
+    known_error: Estimate,
     c: int,
-    singular: Callable[[], tuple[Floats, Floats]],
+    singular_fields: Callable[[], tuple[Floats, Floats]],
 ) -> GapChanges:
     """What finer pressures on closed faces would change.
 
@@ -147,13 +147,13 @@ def gap_changes(
     Parameters
     ----------
     solutions : sequence of Solution
-    estimated : Estimate
+    known_error : Estimate
     c : int
         Crack of the functionals.
-    singular : callable
+    singular_fields : callable
         As of `crack_shape`; called where faces are closed.
     """
-    space, m = solutions[0].space, estimated.z.shape[2]
+    space, m = solutions[0].space, known_error.z.shape[2]
     places = np.array([j.x for j in solutions[0].problem.junctions]).reshape(-1, 2)
     change, by_zone = np.zeros((len(solutions), m)), np.zeros((3, len(solutions), m))
     by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
@@ -164,7 +164,7 @@ def gap_changes(
             rows = np.nonzero(np.asarray(contact.closed) & (np.asarray(contact.pressure) > 0))[0]
             if not len(rows):
                 continue
-            columns = _columns([solution], estimated.z[[k]])
+            columns = _columns([solution], known_error.z[[k]])
             lips = solution.lips[other]
             cell, x = lips.cell[rows, 0], lips.x[rows]
             size = space.mesh.cell_size[cell]
@@ -173,7 +173,7 @@ def gap_changes(
                 side = lip_side(space, other, lips.cell[rows, s], lips.bary[rows, s], sign)
                 u, _ = fields_at(space, columns, lips.cell[rows, s], lips.bary[rows, s], side)
                 if other == c:
-                    u[..., 1:] -= singular()[0][s, rows]
+                    u[..., 1:] -= singular_fields()[0][s, rows]
                 gap += sign * np.einsum("qi,qim->qm", lips.normal[rows], u)
             modulus = solution.problem.elasticity.moduli_of_cells[cell]
             part = (modulus * lips.weight[rows] / size * gap[:, 0])[:, None] * gap[:, 1:]
@@ -197,8 +197,8 @@ def _locking_points(points: Floats, size: float) -> Floats:
 
 def _is_near(x: Floats, places: Floats, reach: Floats) -> Bools:
     """Whether points are within a reach of one of some places `(q,)`."""
-    away = np.linalg.norm(x[:, None] - places, axis=2).min(axis=1, initial=np.inf)
-    return np.asarray(away < reach)
+    distance = np.linalg.norm(x[:, None] - places, axis=2).min(axis=1, initial=np.inf)
+    return np.asarray(distance < reach)
 
 
 def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]:

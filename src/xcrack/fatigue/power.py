@@ -244,9 +244,9 @@ class piecewise(GrowthLaw):  # noqa: N801 - it is used as a function
     363.13 2.36e-05
     """
 
-    pieces: Annotated[tuple[tuple[float, float], ...], Array(shape=(None, 2), hashable=True)]
+    pieces: Annotated[tuple[tuple[float, float], ...], Array(shape=(None, 2), is_hashable=True)]
     knees: Annotated[
-        tuple[float, ...] | None, Array(shape=(None,), unit=TOUGHNESS, hashable=True)
+        tuple[float, ...] | None, Array(shape=(None,), unit=TOUGHNESS, is_hashable=True)
     ] = None
     threshold: LawThreshold = None
     approach: Approach = "cut"

@@ -281,7 +281,7 @@ class CycleIntegration:
         How far each place has come.
     cycles : (g,) array
         Blocks until there.
-    reached : float, length
+    grown_length : float, length
         Up to which it came: less than the last of `sigma` where nothing grows, or the blocks are
         over.
     zones : OverloadZones
@@ -291,7 +291,7 @@ class CycleIntegration:
     sigma: Floats
     arc: Floats
     cycles: Floats
-    reached: float
+    grown_length: float
     zones: OverloadZones
 
     def until(self, sigma: float) -> tuple[Floats, float]:

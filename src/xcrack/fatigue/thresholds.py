@@ -79,8 +79,8 @@ class stepped_threshold(Threshold):  # noqa: N801
     127.2
     """
 
-    R: Annotated[tuple[float, float], Array(shape=(2,), hashable=True)]
-    dK: Annotated[tuple[float, float, float], Array(shape=(3,), unit=TOUGHNESS, hashable=True)]
+    R: Annotated[tuple[float, float], Array(shape=(2,), is_hashable=True)]
+    dK: Annotated[tuple[float, float, float], Array(shape=(3,), unit=TOUGHNESS, is_hashable=True)]
     slope: Annotated[float, Number(least=0, unit=TOUGHNESS)]
 
     def __post_init__(self) -> None:

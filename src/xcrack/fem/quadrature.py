@@ -32,11 +32,11 @@ def _plane_points(
     # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
     # enough (K is the same to its error with half of the points, measured), and one whose rule does
     # not depend on how nodes are numbered.
-    enough = min(max(2 * n - 3, 3), SYMMETRIC)
+    degree_of_simplex = min(max(2 * n - 3, 3), SYMMETRIC)
     corners = subs.bary @ mesh.points[mesh.cells[subs.cell]]
     number, place, share = triangle_points(
         subs.bary, corners, subs.fraction, with_tip, subs.fan, tips, _LEVELS,
-        *simplex_rule(2, degree), *simplex_rule(2, enough), *gauss(n + 1), *gauss(n + 4),
+        *simplex_rule(2, degree), *simplex_rule(2, degree_of_simplex), *gauss(n + 1), *gauss(n + 4),
     )  # fmt: skip
     return number, place, share
 

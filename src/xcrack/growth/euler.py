@@ -206,7 +206,7 @@ def _cycles_across(
         cycles = np.array([way, way_behind]) / begin
     elif interfaces.is_smooth[j]:
         sets = np.array(rule.problem.elasticity.sets_at(rates.stations.x))
-        sets[row] = interfaces.before[j]
+        sets[row] = interfaces.set_before[j]
         rate_here = rates_by_law_of(rule, rates.problem, rates.response, sets)[row]
         rate_there = rates_behind(rule, last, interfaces)[j]
         rate = np.array([[begin, rate_here], [rate_there, end]])

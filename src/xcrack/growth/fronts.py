@@ -600,7 +600,7 @@ def _corrected_crack(
         way[is_of_front] = corrected_advance(
             front, stations.s[is_of_front], first[is_of_front], share[is_of_front]
         )
-    target = stations.waits + way
+    target = stations.waiting_length + way
     is_growing = target >= WAITS_BELOW * plan.cell
     heading = first[:, None] * solves.direction[-1] + share[:, None] * later_direction
     growth_along = np.einsum("ij,ij->i", heading, stations.frame[:, 0])
@@ -688,8 +688,8 @@ def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | Non
         rate_here, rate_there = (
             float(rates_in_set(rule, problem, response, int(k)).max())
             for problem, response, k in (
-                (rates.problem, rates.response, interfaces.before[row]),
-                (*scene_of(rule, last), interfaces.after[row]),
+                (rates.problem, rates.response, interfaces.set_before[row]),
+                (*scene_of(rule, last), interfaces.set_after[row]),
             )
         )
         size = float(solves.scale[row])
@@ -748,7 +748,9 @@ def _with_mean_rates(
     ratio = np.ones(len(stations))
     growth_ahead = _growth_ahead(rule, solves, [_kinds(solves)], zones, length, ratio, blocks)
     cycles = float(growth_ahead.cycles[-1])
-    is_growing = cycles > 0 and (growth_ahead.reached >= length or cycles >= blocks * (1 - 1e-9))
+    is_growing = cycles > 0 and (
+        growth_ahead.grown_length >= length or cycles >= blocks * (1 - 1e-9)
+    )
     rate = growth_ahead.arc[-1] / cycles if is_growing else 0.0 * growth_ahead.arc[-1]
     return replace(solves, rate=rate[None])
 
@@ -780,7 +782,11 @@ def _overloads_between(
     integration = _growth_ahead(
         rule, solves, [first, _all_kinds(later_kinds)], last.zones, plan.length, ratio, np.inf
     )
-    rest = plan.length / integration.reached if 0 < integration.reached < plan.length else 1.0
+    rest = (
+        plan.length / integration.grown_length
+        if 0 < integration.grown_length < plan.length
+        else 1.0
+    )
     return rest * integration.arc[-1], rest * float(integration.cycles[-1]), integration.zones
 
 

@@ -45,7 +45,7 @@ class InterfacesAhead:
         To the first one; inf where there is none.
     behind : (n,) array, length
         From there to where a step behind it ends.
-    before, after : (n,) array of int
+    set_before, set_after : (n,) array of int
         Numbers of the sets on both sides.
     is_smooth : (n,) array of bool
         The materials differ in their laws alone: K does not feel the interface.
@@ -57,8 +57,8 @@ class InterfacesAhead:
 
     way: Floats
     behind: Floats
-    before: Ints
-    after: Ints
+    set_before: Ints
+    set_after: Ints
     is_smooth: Bools
     cell: Floats
     gap: Floats
@@ -138,7 +138,7 @@ def whole_front_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAh
     A front that is in several already goes on with the law of each place.
     """
     interfaces = interfaces_ahead(rule, x, move)
-    if interfaces is None or len(np.unique(_kinds(rule)[interfaces.before])) > 1:
+    if interfaces is None or len(np.unique(_kinds(rule)[interfaces.set_before])) > 1:
         return None
     return interfaces
 
@@ -419,7 +419,7 @@ def rates_behind(rule: GrowthRule, step: Step, interfaces: InterfacesAhead) -> F
         return solves_of(step)[1].rate[-1]
     problem, response = scene_of(rule, step)
     with collected_warnings([]):  # they were given at the solve
-        return rates_by_law_of(rule, problem, response, interfaces.after)
+        return rates_by_law_of(rule, problem, response, interfaces.set_after)
 
 
 def scene_of(rule: GrowthRule, step: Step) -> tuple[Problem, Response]:
@@ -467,8 +467,8 @@ def warn_of_passages(
         name = last.end_name(int(stations.crack[row]), int(stations.front[row]))
         x = stations.x[row] + interfaces.way[row] * move[row] / np.linalg.norm(move[row])
         warn(
-            f"{name} passes from {names[interfaces.before[row]]!r} into "
-            f"{names[interfaces.after[row]]!r} at {coordinates(x.tolist())}, "
+            f"{name} passes from {names[interfaces.set_before[row]]!r} into "
+            f"{names[interfaces.set_after[row]]!r} at {coordinates(x.tolist())}, "
             f"N = {last.cycles + float(cycles[row]):.6g}"
         )
 

@@ -330,11 +330,11 @@ class Stretch:
 
     def arcs(self, length: float | None = None) -> tuple[Floats, float]:
         """Lengths of the paths `(n,)`, and cycles, over all of it or a first part."""
-        pieces = self._whole if length is None else self._up_to(length)
+        pieces = self._all_pieces if length is None else self._up_to(length)
         return pieces.arc, pieces.cycles
 
     @cached_property
-    def _whole(self) -> "_Pieces":
+    def _all_pieces(self) -> "_Pieces":
         return self._up_to(self.length)
 
     def _up_to(self, length: float) -> "_Pieces":
@@ -369,7 +369,7 @@ class Stretch:
         dx_i/dσ = r_i / max_j r_j (cos θ_i t + sin θ_i n), dN/dσ = 1 / max_j r_j. θ is bend √σ and a
         polynomial through the angles of all solves.
         """
-        pieces, bend = self._whole if length is None else self._up_to(length), self.solves.bend
+        pieces, bend = self._all_pieces if length is None else self._up_to(length), self.solves.bend
         if bend.any():
             smooth = angle - bend * np.sqrt(pieces.nodes[:, None])
             theta = _sum(pieces.turns, smooth) + bend * np.sqrt(pieces.s[:, None])

@@ -57,13 +57,13 @@ class GrowthStations(Stations):
         return replace(self, **{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
     @property
-    def waits(self) -> Floats:
+    def waiting_length(self) -> Floats:
         """Length of the growth that waits `(n,)`."""
         return np.linalg.norm(self.offset, axis=1)
 
     def growth(self, rate: Floats, largest: float) -> Floats:
         """Growth in proportion to rates, the largest as given, on top of what waits `(n,)`."""
-        return np.asarray(self.waits + largest * (rate / rate.max()))
+        return np.asarray(self.waiting_length + largest * (rate / rate.max()))
 
 
 def solved_stations(sif: Sequence[SIF]) -> Stations:

@@ -142,7 +142,7 @@ def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
     blocks = np.inf if rule.cycles is None else rule.cycles
     stretch = stretch_of(rule, last_solves, solves.start, length, step.zones, blocks)
     if stretch.integration is not None:
-        length_reached = min(length, stretch.integration.reached)
+        length_reached = min(length, stretch.integration.grown_length)
         is_over_cycles = rule.cycles is not None and stretch.arcs(length_reached)[
             1
         ] >= rule.cycles * (1 - 1e-9)
@@ -177,7 +177,7 @@ def _up_to_interfaces(
     passage_done = passage(
         rule,
         stations.frame,
-        lambda is_passed: mixed_solves(history, solves_after, interfaces.after, is_passed),
+        lambda is_passed: mixed_solves(history, solves_after, interfaces.set_after, is_passed),
         interfaces,
         goal,
         solves.start,
@@ -232,7 +232,7 @@ def _step_to_meeting(
     faces = last_faces(plan.cracks)
     directions = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
 
-    def left(meeting: Meeting, length: float) -> float:
+    def distance_left(meeting: Meeting, length: float) -> float:
         place = stations.x + _growth(stations, stretch, length).move
         to = meeting.x if meeting.other < 0 else place[meeting.other]
         return float((to - place[meeting.tip]) @ directions[meeting.tip])
@@ -241,7 +241,9 @@ def _step_to_meeting(
     if stretch.integration is not None and largest_length > stretch.integration.sigma[-1]:
         zones, solves = step.zones, stretch.solves
         stretch = stretch_of(rule, solves, plan.sigma, largest_length, zones)
-    arrival = [_arrival(partial(left, meeting), largest_length) for meeting in meetings_ahead]
+    arrival = [
+        _arrival(partial(distance_left, meeting), largest_length) for meeting in meetings_ahead
+    ]
     first = min(arrival)
     if first == np.inf and not any(meeting.is_soon for meeting in meetings_ahead):
         return plan
@@ -528,7 +530,7 @@ def _step_through_interface(
     rate_there = np.where(jumps, rates.law_rate, begin.rate[0])
     is_smooth = is_crossing & interfaces.is_smooth
     if is_smooth.any():
-        sets = np.where(is_smooth, interfaces.before, interfaces.after)
+        sets = np.where(is_smooth, interfaces.set_before, interfaces.set_after)
         rate_before = rates_by_law_of(rule, rates.problem, rates.response, sets)
         rate_here = np.where(is_smooth, rate_before, rate_here)
         rate_there = np.where(is_smooth, rates_behind(rule, last, interfaces), rate_there)
@@ -553,7 +555,7 @@ def _step_through_interface(
 
     def solves_in(is_passed: Bools) -> SolveHistory:
         return (
-            mixed_solves(history.last(2), solves_after, interfaces.after, is_passed)
+            mixed_solves(history.last(2), solves_after, interfaces.set_after, is_passed)
             if is_passed.any()
             else history
         )
@@ -644,21 +646,21 @@ def _corrected_points(
     gap = x - (stations.x + plan.move)
     spans = _spans(rule, last, stretch)
     by_places = _places(rule, last, solves, spans, frame, gap)
-    known_error, newest_error = by_places.known, by_places.newest
+    known_error, newest_error = by_places.known_error, by_places.newest_error
     cycles, of_life = _cycles(rule, last, spans, growth)
     lag = _OF_LENGTH * by_places.ahead / solves.scale
     lag_behind = error.behind + float(lag[0].max(initial=0.0))
     # What an end lags behind by after this step counts in all cycles that follow.
     whole_cycles = max(growth.cycles, PAST * last.cycles)
     cycle_error_alone = (
-        of_life.alone + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole_cycles
+        of_life.own_error + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole_cycles
     )
-    cycle_error = of_life.known + of_life.newest - error.newest_cycles
+    cycle_error = of_life.known_error + of_life.newest_error - error.newest_cycles
     cycle_error += solves.exponent * lag_behind * growth.cycles
     stations_after = _stations(cracks, identities, x, stations.fresh | moves)
     # A tip that is astray turns its next face by a share of that: where T > 0 it goes farther so.
     drift = 1 + _ASTRAY * np.maximum(gamma, 0.0)
-    place_error = drift * by_places.off
+    place_error = drift * by_places.own_error
     control = next_control(
         rule, last.control, plan.length, float(place_error.max(initial=0.0)), cycle_error_alone,
         growth.cycles,
@@ -680,7 +682,7 @@ def _corrected_points(
             K_place=float(drift[fastest_row]) * error.K_place,
             behind=lag_behind,
             newest_place=rates.split(newest_error),
-            newest_cycles=of_life.newest,
+            newest_cycles=of_life.newest_error,
         ),
         control,
         stretch.zones,
@@ -732,14 +734,14 @@ class _Spans:
     ----------
     curve, line : Stretch
         The step by all solves that are known, and by the last two.
-    before : tuple of Stretch
+    of_step_before : tuple of Stretch
         The step before by the last two solves then, by all that were known then, and by those of
         now; none behind a first step, nor where retardation leaves its error unknown.
     """
 
     curve: Stretch
     line: Stretch
-    before: tuple[Stretch, ...] = ()
+    of_step_before: tuple[Stretch, ...] = ()
 
 
 def _spans(rule: GrowthRule, last: Step, curve: Stretch) -> _Spans:
@@ -751,12 +753,14 @@ def _spans(rule: GrowthRule, last: Step, curve: Stretch) -> _Spans:
         return _Spans(curve, line)
     begin, end = old.sigma[-2:].tolist()
 
-    def over(each: SolveHistory) -> Stretch:
+    def stretch_before(each: SolveHistory) -> Stretch:
         return stretch_of(rule, each, begin, end - begin, last.earlier_zones)
 
-    then = over(old)
+    then = stretch_before(old)
     return _Spans(
-        curve, line, (then if old.n_solves == 2 else over(old.last(2)), then, over(solves))
+        curve,
+        line,
+        (then if old.n_solves == 2 else stretch_before(old.last(2)), then, stretch_before(solves)),
     )
 
 
@@ -766,17 +770,17 @@ class _PlacesError:
 
     Attributes
     ----------
-    known, newest : (n,) arrays, length
+    known_error, newest_error : (n,) arrays, length
         What is known once and for all with it, and what the next solve tells better.
-    off : (n,) array, length
+    own_error : (n,) array, length
         Of this step alone.
     ahead : (2, n) array, length
-        Parts of `known` and of `newest` along the paths.
+        Parts of `known_error` and of `newest_error` along the paths.
     """
 
-    known: Floats
-    newest: Floats
-    off: Floats
+    known_error: Floats
+    newest_error: Floats
+    own_error: Floats
     ahead: Floats
 
 
@@ -804,7 +808,7 @@ def _places(
 
     angle, old_angle = solves.angles(frame), old_solves.angles(frame)
     move_now = spans.curve.growth(frame, angle).move - spans.line.growth(frame, angle[-2:]).move
-    line, then, new = spans.before
+    line, then, new = spans.of_step_before
     move = then.growth(frame, old_angle).move
     move_before = new.growth(frame, angle).move - move
     ratio, move_length = np.ones(len(size)), np.linalg.norm(move_before, axis=1)
@@ -828,9 +832,9 @@ class _CyclesError:
     What is known once and for all with it, and what the next solve tells better.
     """
 
-    alone: float
-    known: float
-    newest: float
+    own_error: float
+    known_error: float
+    newest_error: float
 
 
 def _cycles(
@@ -849,7 +853,7 @@ def _cycles(
     if old_solves.sigma[0] > 0:  # the step before has passed an interface
         return growth.cycles, _CyclesError(line_error, 0.0, line_error)
     # The second step: the parabola tells what the first one, along a line, was off.
-    line, curve = (span.arcs()[1] for span in spans.before[1:])
+    line, curve = (span.arcs()[1] for span in spans.of_step_before[1:])
     both = _RATIO_OF_FIRST * (line_error + share * abs(curve - line))
     return growth.cycles + curve - line, _CyclesError(_OF_SECOND * line_error, 0.0, both)
 
@@ -866,7 +870,7 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
         return _CyclesError(line_error, line_error + cycles_before, 0.0)
 
     share = share_left(rule)
-    line, then, new = (span.arcs()[1] for span in spans.before)
+    line, then, new = (span.arcs()[1] for span in spans.of_step_before)
     error_before, error_now = share * abs(then - line), abs(then - new)
     length_ratio = plan_of(last).length / float(old_solves.sigma[2] - old_solves.sigma[1])
     newest_error = line_error * (

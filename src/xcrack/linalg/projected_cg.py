@@ -210,14 +210,14 @@ class _Descent:
     def __init__(self, K: Operator, b: Floats, plane: _Plane | None, y: Floats) -> None:
         self.K, self.b, self.plane = K, b, plane
         self.y = y.copy() if plane is None else plane.nearest(y)
-        self.carried = np.zeros(0 if plane is None else len(plane.scale))
+        self.row_forces = np.zeros(0 if plane is None else len(plane.scale))
         self.p: Floats | None = None
         self.rz, self.norm = 1.0, np.inf
 
     @property
     def pressure(self) -> Floats:
         """Of the closed groups: all that was taken off the residual."""
-        return np.zeros(0) if self.plane is None else -self.plane.scale * self.carried
+        return np.zeros(0) if self.plane is None else -self.plane.scale * self.row_forces
 
     def begin(self) -> Iteration[None]:
         image = (yield Request.TIMES, self.y) if self.y.any() else 0.0
@@ -251,7 +251,7 @@ class _Descent:
         if self.plane is not None:
             correction = self.plane.pressure_of(r)
             r -= self.plane.rows.T @ correction
-            self.carried += correction
+            self.row_forces += correction
         self.r = _without_motions(self.K.null, r)
         self.norm = _norm(r)
 

@@ -669,10 +669,10 @@ class _SetTable:
                     parts += [self.members(entry, line, number) for entry in entries if entry]
             members = np.concatenate(parts).tolist()
         key = (line.instance, name.casefold())
-        previous = self.named.get(key)
-        earlier_members = [] if previous is None else previous.members.tolist()
+        earlier_set = self.named.get(key)
+        earlier_members = [] if earlier_set is None else earlier_set.members.tolist()
         self.named[key] = NamedSet(
-            name if previous is None else previous.name,
+            name if earlier_set is None else earlier_set.name,
             np.array(list(dict.fromkeys([*earlier_members, *members])), dtype=np.int64),
         )
 
@@ -714,9 +714,9 @@ def _find(
             return sets[scope, title]
     first, dot, remainder = title.partition(".")
     if dot:
-        for known in instances:
-            if known.casefold() == first and (known, remainder) in sets:
-                return sets[known, remainder]
+        for instance in instances:
+            if instance.casefold() == first and (instance, remainder) in sets:
+                return sets[instance, remainder]
     if len(instances) == 1:
         return sets.get((instances[0], title))
     return None

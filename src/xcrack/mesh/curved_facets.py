@@ -156,8 +156,8 @@ def lattice(points: Floats, facets: Ints) -> Lattice:
     is_turned = ends[..., 0] > ends[..., 1]
     edges, number = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     number = number.reshape(len(facets), len(pairs))
-    three = np.where(is_turned[..., None], [2, 1, 0], [0, 1, 2])
-    first = len(corner) + 3 * number[..., None] + three
+    quarter = np.where(is_turned[..., None], [2, 1, 0], [0, 1, 2])
+    first = len(corner) + 3 * number[..., None] + quarter
     nodes = [local, first.reshape(len(facets), -1)]
     if d == 3:
         inner = len(corner) + 3 * len(edges) + np.arange(3 * len(facets)).reshape(-1, 3)

@@ -185,15 +185,15 @@ def split_sides(points: Floats, faces: Ints, is_marked: Bools) -> tuple[Floats, 
     corner = np.take_along_axis(faces, column, axis=1)
     centre = number[np.take_along_axis(inverse, column, axis=1)]
     (a, b, c), (ab, bc, ca) = corner.T, centre.T
-    is_whole, two, three = ab < 0, bc >= 0, ca >= 0
+    is_whole, is_from_b, is_from_c = ab < 0, bc >= 0, ca >= 0
     parts = [
         faces[is_whole],
-        np.stack([b, c, ab], axis=1)[~is_whole & ~two],
-        np.stack([b, bc, ab], axis=1)[~is_whole & two],
-        np.stack([bc, c, ab], axis=1)[~is_whole & two],
-        np.stack([c, a, ab], axis=1)[~is_whole & ~three],
-        np.stack([c, ca, ab], axis=1)[~is_whole & three],
-        np.stack([ca, a, ab], axis=1)[~is_whole & three],
+        np.stack([b, c, ab], axis=1)[~is_whole & ~is_from_b],
+        np.stack([b, bc, ab], axis=1)[~is_whole & is_from_b],
+        np.stack([bc, c, ab], axis=1)[~is_whole & is_from_b],
+        np.stack([c, a, ab], axis=1)[~is_whole & ~is_from_c],
+        np.stack([c, ca, ab], axis=1)[~is_whole & is_from_c],
+        np.stack([ca, a, ab], axis=1)[~is_whole & is_from_c],
     ]
     return np.concatenate([points, middle]), np.concatenate(parts)
 

@@ -295,7 +295,7 @@ def read_deck(
         }),
         points=MappingProxyType({
             name: lock(body.places[body.nodes(rows[body.is_inside(rows)])])
-            for name, rows in body.raw.point_sets
+            for name, rows in body.raw_mesh.point_sets
             if name not in body.mesh.facet_sets and not name.startswith("_")
             and body.is_inside(rows).any()
         }),

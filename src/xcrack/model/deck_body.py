@@ -138,7 +138,7 @@ class DeckBody:
 
     Attributes
     ----------
-    raw : RawMesh
+    raw_mesh : RawMesh
     mesh : Mesh
         With the facet sets of deck and loads.
     dim : int
@@ -176,8 +176,8 @@ class DeckBody:
             if model.is_body(group)
         ]
         source = model.path.name
-        self.raw: RawMesh = model.raw_mesh([*facets, *cells])
-        linear_raw = linear_mesh(self.raw, source, strict=False)
+        self.raw_mesh: RawMesh = model.raw_mesh([*facets, *cells])
+        linear_raw = linear_mesh(self.raw_mesh, source, strict=False)
         points, simplices, facet_sets, self._cell_sets, self._number = mesh_parts(
             linear_raw, source
         )

@@ -221,7 +221,7 @@ class Elasticity:
         return result
 
     def initial_stress(
-        self, load: Any, x: Floats, cell: Ints, bary: Floats, exact: bool = False
+        self, load: Any, x: Floats, cell: Ints, bary: Floats, is_exact: bool = False
     ) -> Floats:
         """Stress `(q, d, d)` that a load makes in the undeformed body, at points given by cell.
 
@@ -230,13 +230,13 @@ class Elasticity:
         load : Load
         x : (q, d) array, length
         cell, bary : (q,) array of int and (q, d + 1) array
-        exact : bool
+        is_exact : bool
             As of `at_points`.
         """
         if self.is_uniform:
             return np.asarray(load.initial_stress(x, self.materials[0]))
         result = np.empty((len(x), x.shape[1], x.shape[1]))
-        for rows, material in self.at_points(cell, bary, exact):
+        for rows, material in self.at_points(cell, bary, is_exact):
             result[rows] = load.initial_stress(x[rows], material)
         return result
 

@@ -158,7 +158,7 @@ class Pieces:
     stress : (n, 3, 3) array, stress
         Mean of the pieces that meet at the point on the same lip, weighted by their size. At a
         tip or front, where it is infinite, each gives the value half way to its centre.
-    plain : (m, k) array of int
+    plain_nodes : (m, k) array of int
         Cells without enriched functions, with the nodes of the order of the solution.
     split : (s, k) array of int
         Sub-cells of the other cells, always with midpoints.
@@ -178,7 +178,7 @@ class Pieces:
     points: Floats
     displacement: Floats
     stress: Floats
-    plain: Ints
+    plain_nodes: Ints
     split: Ints
     cell: Ints
     side: Ints
@@ -190,7 +190,7 @@ class Pieces:
     def corners(self) -> Ints:
         """Vertices of all pieces `(m + s, d + 1)`."""
         d = self.points.shape[1]
-        return lock(np.concatenate([self.plain[:, : d + 1], self.split[:, : d + 1]]))
+        return lock(np.concatenate([self.plain_nodes[:, : d + 1], self.split[:, : d + 1]]))
 
     @cached_property
     def material(self) -> Ints:
@@ -199,7 +199,9 @@ class Pieces:
         result = np.zeros(len(self.points), dtype=np.int64)
         if len(set_number):
             for block, cells in zip(
-                (self.plain, self.split), np.split(self.cell, [len(self.plain)]), strict=True
+                (self.plain_nodes, self.split),
+                np.split(self.cell, [len(self.plain_nodes)]),
+                strict=True,
             ):
                 result[block] = set_number[cells][:, None]
         return lock(result)
@@ -264,7 +266,7 @@ def pieces(solution: Solution) -> Pieces:
         points=lock(x),
         displacement=lock(u),
         stress=lock(mean.reshape(-1, 3, 3)),
-        plain=lock(number),
+        plain_nodes=lock(number),
         split=lock(joined_numbers.reshape(-1, n_shapes(2, d))),
         cell=lock(np.concatenate([plain_cells, cells.cell])),
         side=lock(np.concatenate([cell_side(space, plain_cells), cells.side])),

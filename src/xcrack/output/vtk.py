@@ -141,7 +141,7 @@ def _grid_path(target: Path) -> Path:
 def _write_grid(body: Pieces, path: Path) -> None:
     writer = _vtk("vtkIOXML").vtkXMLUnstructuredGridWriter()
     d = body.points.shape[1]
-    blocks = [b[:, _ORDER[b.shape[1]]] for b in (body.plain, body.split)]
+    blocks = [b[:, _ORDER[b.shape[1]]] for b in (body.plain_nodes, body.split)]
     kind = np.concatenate([np.full(len(b), _KIND[b.shape[1]], dtype=np.uint8) for b in blocks])
     grid = _vtk("vtkCommonDataModel").vtkUnstructuredGrid()
     grid.SetPoints(_points(body.points))

@@ -193,7 +193,7 @@ def growth_curve(
             'growth_curve: measure = "advance" is of the one tip that drives a run, and '
             f"{'more than one does' if crack is None else 'a crack is named'}: give {_MEASURES}."
         )
-    lead = rows.drives
+    lead = rows.is_driving
     a, step = rows.a[lead], rows.step[lead]
     N = np.concatenate([[0.0], np.cumsum(rows.cycles[step])]) + history.steps[0].cycles
     return GrowthCurve(N, np.concatenate([a[:, 0], a[-1:, 1]]), _bounded_rates(rows.rate[lead]))

@@ -386,7 +386,7 @@ def _of_levels(history: History, lead: DrivingForce, law: Law, block: SpectrumBl
 
 def _of_tips(rows: DrivingForce, law: Law, scatter: Scatter) -> float:
     """Largest change of shares of the advance, of the 5 and 95 % samples of each source alone."""
-    cycles, worst = rows.cycles[rows.step[rows.drives]], 0.0
+    cycles, worst = rows.cycles[rows.step[rows.is_driving]], 0.0
     for name, part in scatter.parts.items():
         if name in ("C", "a0"):
             continue

@@ -162,7 +162,7 @@ class DrivingForce:
     ----------
     step : (k,) array of int
         Which step a row belongs to.
-    drives : (k,) array of bool
+    is_driving : (k,) array of bool
         The place with the largest rate of its step, by which cycles are counted.
     place : (k, 2) array of int
         Crack and number.
@@ -184,7 +184,7 @@ class DrivingForce:
     """
 
     step: Ints
-    drives: Ints
+    is_driving: Ints
     place: Ints
     da: Floats
     a: Floats
@@ -200,7 +200,7 @@ class DrivingForce:
     @property
     def is_one_tip(self) -> bool:
         """Whether the driving places of the steps follow each other, as those of one tip."""
-        lead = self.drives
+        lead = self.is_driving
         a, da = self.a[lead], self.da[lead]
         return bool((np.abs(a[1:, 0] - a[:-1, 1]) <= _FOLLOWS * da[1:]).all())
 
@@ -208,8 +208,8 @@ class DrivingForce:
     def lead(self) -> "DrivingForce":
         """The driving place of each step only, and the cycles of the steps that have one."""
         names = ("step", "drives", "place", "da", "a", "rate", "size", "spread", "dK", "R", "count")
-        parts = {name: getattr(self, name)[self.drives] for name in names}
-        return replace(self, **parts, cycles=self.cycles[self.step[self.drives]])
+        parts = {name: getattr(self, name)[self.is_driving] for name in names}
+        return replace(self, **parts, cycles=self.cycles[self.step[self.is_driving]])
 
     def rates(self, law: Law, factor: float | Floats = 1.0) -> Floats:
         """What a law says of all rows `(..., k, 2)`, with ranges times a factor `(..., k, 2)`."""
@@ -267,7 +267,7 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
     ranges, ratios, count = one if block is None else _of_blocks(steps, block, step, where)
     return DrivingForce(
         step=step,
-        drives=is_driving.astype(bool),
+        is_driving=is_driving.astype(bool),
         place=where[:, :2],
         da=da,
         a=a,
@@ -481,7 +481,7 @@ def recompute_rates(
     rows = driving_forces(steps, block)
     if old_law is not None and not np.allclose(rows.rates(old_law), rows.rate, rtol=1e-6, atol=0):
         raise ProblemError("rerate: the steps have other rates than the law they are said to have.")
-    first, scale = rows.drives, np.ones((int(rows.drives.sum()), 2))
+    first, scale = rows.is_driving, np.ones((int(rows.is_driving.sum()), 2))
     if program is None:
         rate = rows.rates(law)
     else:
@@ -556,7 +556,7 @@ def bound_of_shares(rows: DrivingForce, new_rates: Floats, since: Floats) -> flo
     worst = np.zeros(len(since))
     for n, step in enumerate(first[: len(since)].tolist()):
         is_of_step = rows.step == step
-        lead = is_of_step & rows.drives
+        lead = is_of_step & rows.is_driving
         with np.errstate(invalid="ignore"):
             change = np.abs(
                 (new_rates[is_of_step] / old_rates[is_of_step])

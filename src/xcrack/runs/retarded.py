@@ -187,9 +187,9 @@ class CycledPath:
                 blocks=limit - blocks[-1],
             )
             zones = integration.zones
-            a.append(begin + integration.reached)
+            a.append(begin + integration.grown_length)
             blocks.append(blocks[-1] + float(integration.cycles[-1]))
-            if integration.reached < (end - begin) * (1 - _ROUND_OFF):
+            if integration.grown_length < (end - begin) * (1 - _ROUND_OFF):
                 is_at_limit = blocks[-1] >= limit * (1 - _ROUND_OFF)
                 why_ended = f"max_blocks = {limit:.6g} reached" if is_at_limit else _STANDS
                 return Retarded(np.array(a), np.array(blocks), why_ended)

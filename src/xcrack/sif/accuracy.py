@@ -171,14 +171,14 @@ def warn_of(
         return
     worst, text = _OFF, ""
     for solution, part in zip(solutions, parts, strict=True):
-        off = np.abs(part.eta) + part.bar
-        off[part.closed, 0] = 0.0  # K_I is exact there
+        error_of_K = np.abs(part.eta) + part.bar
+        error_of_K[part.closed, 0] = 0.0  # K_I is exact there
         largest = float(np.abs(part.K).max(initial=0.0))
         scale = max(largest, _NOTHING * _K_of_mean_stress(solution, part, radius))
-        if not off.size or off.max() <= worst * scale:
+        if not error_of_K.size or error_of_K.max() <= worst * scale:
             continue
-        worst = float(off.max()) / scale
-        row, mode = np.unravel_index(off.argmax(), off.shape)
+        worst = float(error_of_K.max()) / scale
+        row, mode = np.unravel_index(error_of_K.argmax(), error_of_K.shape)
         text = (
             f"K at {at(part.x[row])}: {('K_I', 'K_II')[mode]} = {part.K[row, mode]:.4g} is off by "
             f"{part.eta[row, mode]:.2g} ± {part.bar[row, mode]:.2g} by its estimate, up to "

@@ -105,11 +105,11 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
         result = estimate(factored, solutions, [tip_goal(solutions[0], t) for t in tips])
 
         @cache
-        def singular() -> tuple[Floats, Floats]:
+        def singular_fields() -> tuple[Floats, Floats]:
             return on_faces(solutions[0], tips)
 
-        bend, bend_bar = crack_shape(solutions, result, crack, singular)
-        gaps = gap_changes(solutions, result, crack, singular)
+        bend, bend_bar = crack_shape(solutions, result, crack, singular_fields)
+        gaps = gap_changes(solutions, result, crack, singular_fields)
         rim, chords = rim_shape(solutions, result.z)
     shape = (len(solutions), len(tips), 2)
     corners = _inner_corners(solutions[0].problem.mesh)
@@ -406,11 +406,11 @@ def _round_kinks(solution: Solution, crack: int) -> list[Floats]:
     # A kink of the cut is that kink of the crack which is nearest to it.
     nearest = np.linalg.norm(of_cut[:, None] - kinks, axis=2).argmin(axis=1)
     sizes = cell_sizes(solution.problem.mesh, kinks)
-    away = [
+    distances = [
         np.linalg.norm(of_cut[nearest == k] - x, axis=1).min(initial=np.inf)
         for k, x in enumerate(kinks)
     ]
-    every = zip(kinks, away, sizes, strict=True)
+    every = zip(kinks, distances, sizes, strict=True)
     return [x for x, d, size in every if d > size and _faces_press(solution, crack, x)]
 
 
@@ -419,12 +419,12 @@ def _refusal_at_kinks(solution: Solution, crack: int) -> str:
 
     A sharp kink locks where one that the cut rounds off slides: no first-order estimate sees that.
     """
-    rounded = _round_kinks(solution, crack)
-    if not rounded:
+    round_kinks = _round_kinks(solution, crack)
+    if not round_kinks:
         return ""
     return (
-        f"the faces press at the kink at {at(rounded[0])}, which the cut rounds off because it is "
-        "sharper than 100° or less than a cell from a tip or another kink: compare with a mesh "
+        f"the faces press at the kink at {at(round_kinks[0])}, which the cut rounds off because it "
+        "is sharper than 100° or less than a cell from a tip or another kink: compare with a mesh "
         "that is finer there"
     )
 
@@ -434,9 +434,9 @@ def _room_of_round_kinks(solution: Solution, crack: int) -> list[tuple[Floats, f
     points = solution.space.cracks[crack].points
     result = []
     for x in _round_kinks(solution, crack):
-        away = np.linalg.norm(points - x, axis=1)
+        distances = np.linalg.norm(points - x, axis=1)
         size = float(cell_sizes(solution.problem.mesh, x[None])[0])
-        result.append((x, float(away[away > _SAME * size].min()), size))
+        result.append((x, float(distances[distances > _SAME * size].min()), size))
     return result
 
 
@@ -572,7 +572,7 @@ def _is_whole_path(solutions: Sequence[Solution]) -> bool:
 
 
 def bars_beside(
-    sifs: Sequence[SIF], better_sifs: Sequence[SIF], reason: str, rubs: bool
+    sifs: Sequence[SIF], better_sifs: Sequence[SIF], reason: str, has_friction: bool
 ) -> list[KErrors]:
     """Bars of K that are the difference to a better one, which is best.
 
@@ -582,7 +582,7 @@ def bars_beside(
         One a state, along the fronts of one crack.
     reason : str
         Why there is none, where the better one has other fronts.
-    rubs : bool
+    has_friction : bool
         Whether faces rub: slip binds the modes together, and none is better known than the others;
         both orders slip on the same groups of contact, and what domains of the better one differ by
         counts too.
@@ -592,7 +592,10 @@ def bars_beside(
         for a, b in zip(sifs, better_sifs, strict=True)
     ):
         return [no_bars(sif.K.shape, reason) for sif in sifs]
-    return [_of_difference(sif, other, rubs) for sif, other in zip(sifs, better_sifs, strict=True)]
+    return [
+        _of_difference(sif, other, has_friction)
+        for sif, other in zip(sifs, better_sifs, strict=True)
+    ]
 
 
 def _of_spread(sif: SIF) -> KErrors:
@@ -616,20 +619,20 @@ def _half_of_spread(sif: SIF) -> Floats:
     return np.asarray(np.sqrt(np.sum(np.square(parts), axis=0)))
 
 
-def _of_difference(sif: SIF, finer_sif: SIF, rubs: bool) -> KErrors:
+def _of_difference(sif: SIF, finer_sif: SIF, has_friction: bool) -> KErrors:
     """K of the other solution is best, and the difference its bar; more where faces rub."""
-    better, left = np.empty((2, *sif.K.shape))
-    half = _half_of_spread(finer_sif) if rubs else np.zeros_like(finer_sif.K)
+    finer_K, domain_error = np.empty((2, *sif.K.shape))
+    half = _half_of_spread(finer_sif) if has_friction else np.zeros_like(finer_sif.K)
     for front in np.unique(sif.front):
         is_on_front, other = sif.front == front, finer_sif.front == front
-        for to, values in ((better, finer_sif.K), (left, half)):
+        for to, values in ((finer_K, finer_sif.K), (domain_error, half)):
             to[is_on_front] = _at(sif.x[is_on_front], finer_sif.x[other], values[other])
-    eta = better - sif.K
+    eta = finer_K - sif.K
     eta[sif.closed, 0] = 0.0
     mean = _mean(sif, eta)
-    if rubs:
+    if has_friction:
         mean = np.maximum(mean, _LEAST_OF_MODES * mean.max(axis=1, keepdims=True, initial=0.0))
-    return _complete_errors(sif, eta, np.hypot(np.maximum(np.abs(eta), mean), left))
+    return _complete_errors(sif, eta, np.hypot(np.maximum(np.abs(eta), mean), domain_error))
 
 
 def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:

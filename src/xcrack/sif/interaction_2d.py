@@ -257,8 +257,10 @@ def _load_terms(
             total -= np.einsum("q,qi,qi,rq->r", points.weight, b, field.gradient[:, :, 0], q)
         if "initial_stress" in load.acts:
             where = x, points.cell, points.bary
-            initial_stress = factor * elasticity.initial_stress(load, *where, exact=True)
-            at_tip = factor * elasticity.initial_stress(load, *tip_place(solution, t), exact=True)
+            initial_stress = factor * elasticity.initial_stress(load, *where, is_exact=True)
+            at_tip = factor * elasticity.initial_stress(
+                load, *tip_place(solution, t), is_exact=True
+            )
             stress_in_frame = np.einsum("ai,qij,bj->qab", R, initial_stress, R)
             change = np.einsum("ai,qij,bj->qab", R, initial_stress - at_tip, R)
             stress_of_tip = R @ at_tip[0] @ R.T

@@ -265,7 +265,7 @@ def rounded_range(low: float, high: float, field: str) -> tuple[float, float]:
 def _triangles(body: Pieces) -> Ints:
     """Straight triangles between all nodes of the pieces."""
     parts = []
-    for block in (body.plain, body.split):
+    for block in (body.plain_nodes, body.split):
         if block.shape[1] == 6:
             a, b, c, ab, ac, bc = block.T
             quarters = [(a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac)]
@@ -279,7 +279,7 @@ def _edges(body: Pieces) -> tuple[Ints, Ints]:
     """Edges of pieces: vertices and midpoint (-1: straight), and one of their pieces."""
     pairs = local_edges(2)
     parts = []
-    for block in (body.plain, body.split):
+    for block in (body.plain_nodes, body.split):
         middle = block[:, 3:] if block.shape[1] == 6 else np.full((len(block), 3), -1)
         parts.append(np.concatenate([block[:, pairs], middle[:, :, None]], axis=2).reshape(-1, 3))
     edge = np.concatenate(parts)

@@ -127,9 +127,9 @@ def crossing(
 def section(body: Pieces, level: Floats | None) -> TriangleSoup:
     """Triangles in which the pieces meet a plane."""
     assert level is not None
-    blocks = [body.plain]
-    if body.plain.shape[1] == 10:
-        blocks = [body.plain[:, _SMALL[10]].reshape(-1, 4)]
+    blocks = [body.plain_nodes]
+    if body.plain_nodes.shape[1] == 10:
+        blocks = [body.plain_nodes[:, _SMALL[10]].reshape(-1, 4)]
     blocks.append(body.split[:, _SMALL[10]].reshape(-1, 4))
     tetrahedra = np.concatenate(blocks)
     values = level[tetrahedra]
@@ -173,7 +173,7 @@ def faces(body: Pieces, curved_sides: CurvedSides | None) -> Faces:
     of_shell: list[Ints] = [np.zeros(0, np.int64)]
     of_lines: list[list[Ints]] = [[np.zeros(0, np.int64)] for _ in range(3)]
     first = 0
-    for block in (body.plain, body.split):
+    for block in (body.plain_nodes, body.split):
         cell = body.cell[first : first + len(block)]
         first += len(block)
         is_near = rim[cell].any(axis=1) | on_lip[block[:, :4]].sum(axis=1).astype(bool)
@@ -244,7 +244,7 @@ def on_facets(body: Pieces, level: Floats | None) -> Ints:
     assert level is not None
     parts = [np.zeros((0, 3), np.int64)]
     mesh, first = body.solution.space.mesh, 0
-    for block in (body.plain, body.split):
+    for block in (body.plain_nodes, body.split):
         cell = body.cell[first : first + len(block)]
         first += len(block)
         values = level[block[:, :4]]

@@ -257,8 +257,8 @@ def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
 
 @kernel
 def front_terms(  # type: ignore[no-untyped-def]
-    weight, gradient, force, initial_stress, change, polar, frame, turn, hat, share, step, radii,
-    lam, mu, is_curved, slopes, result,
+    weight, gradient, force, initial_stress, change, polar_place, frame, turn, hat, share, step,
+    radii, lam, mu, is_curved, slopes, result,
 ):  # fmt: skip
     """Add the domain integrals of points to those of the hats.
 
@@ -272,7 +272,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         Body force, if any.
     initial_stress, change : (q or 0, 3, 3, n) arrays
         Initial stress, if any, and how it differs from that at the foot.
-    polar, frame, turn : (q, 2), (q, 3, 3) and (q, 4) arrays
+    polar_place, frame, turn : (q, 2), (q, 3, 3) and (q, 4) arrays
         Radius and angle; frame and its curvatures at the foot.
     hat : (q, 2) array of int
         The two hats that overlap there.
@@ -307,7 +307,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         np.empty((2, domains)),
     )
     for q in range(len(weight)):
-        r, theta = polar[q, 0], polar[q, 1]
+        r, theta = polar_place[q, 0], polar_place[q, 1]
         if r >= _largest_radius(radii, hat[q]) or r <= 0.0:
             continue
         ch, sh = math.cos(0.5 * theta), math.sin(0.5 * theta)
@@ -392,8 +392,8 @@ def front_terms(  # type: ignore[no-untyped-def]
 
 @kernel
 def surface_terms(  # type: ignore[no-untyped-def]
-    weight, outward_normal, traction, gradient, initial_stress, polar, frame, hat, share, radii,
-    lam, mu, result,
+    weight, outward_normal, traction, gradient, initial_stress, polar_place, frame, hat, share,
+    radii, lam, mu, result,
 ):  # fmt: skip
     """Subtract the integrals of P_kj m_j V_k over a lip or a side from those of the hats.
 
@@ -422,14 +422,14 @@ def surface_terms(  # type: ignore[no-untyped-def]
     S = np.empty((3, 3))
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(len(weight)):
-        r = polar[q, 0]
+        r = polar_place[q, 0]
         if r >= _largest_radius(radii, hat[q]) or r <= 0.0:
             continue
         for a in range(3):
             m_out[a] = 0.0
             for i in range(3):
                 m_out[a] += frame[q, a, i] * outward_normal[q, i]
-        ch, sh = math.cos(0.5 * polar[q, 1]), math.sin(0.5 * polar[q, 1])
+        ch, sh = math.cos(0.5 * polar_place[q, 1]), math.sin(0.5 * polar_place[q, 1])
         for mode in range(3):
             _unit_field(
                 mode, r, ch, sh, kolosov, scale, U[mode], U_turn[mode], G[mode], slope[mode],

@@ -407,15 +407,15 @@ def _longest_side(corner):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _with_room(table, count, more):  # type: ignore[no-untyped-def]
+def _with_room(table, count, n_rows):  # type: ignore[no-untyped-def]
     """A table with so many more rows than those in use, twice as long where it is too short."""
-    if count + more <= len(table):
+    if count + n_rows <= len(table):
         return table
-    longer = np.empty((2 * (count + more), 5))
+    long_table = np.empty((2 * (count + n_rows), 5))
     for q in range(count):
         for k in range(5):
-            longer[q, k] = table[q, k]
-    return longer
+            long_table[q, k] = table[q, k]
+    return long_table
 
 
 @kernel
@@ -453,14 +453,17 @@ def _put_fan(table, count, number, vertex, corner, share, s, ws, t, wt):  # type
         first, last = a * math.sin(part * angle), b * math.sin((1 - part) * angle)
         end = first / (first + last) if first + last > 0 else part
         for i in range(len(s)):
-            u, radial = s[i] * s[i], 4 * s[i] ** 3 * ws[i]  # dV = 2 area u du dtau with u = s²
+            u, radial_weight = (
+                s[i] * s[i],
+                4 * s[i] ** 3 * ws[i],
+            )  # dV = 2 area u du dtau with u = s²
             for j in range(len(t)):
                 tau = begin + (end - begin) * t[j]
                 table[count, 0] = number
                 for v in range(3):
-                    far = (1 - tau) * vertex[1, v] + tau * vertex[2, v]
-                    table[count, 1 + v] = (1 - u) * vertex[0, v] + u * far
-                table[count, 4] = share * (end - begin) * radial * wt[j]
+                    far_point = (1 - tau) * vertex[1, v] + tau * vertex[2, v]
+                    table[count, 1 + v] = (1 - u) * vertex[0, v] + u * far_point
+                table[count, 4] = share * (end - begin) * radial_weight * wt[j]
                 count += 1
     return table, count
 
@@ -482,22 +485,22 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
     i, j, k = best, (best + 1) % 3, (best + 2) % 3
     for half in range(2):
         part = along if half == 0 else 1 - along
-        second, third = k if half == 0 else j, i if half == 0 else k
+        j2, j3 = k if half == 0 else j, i if half == 0 else k
         if part <= 1e-14:
             continue
         for b in range(3):
             fan[0, b] = (1 - along) * vertex[i, b] + along * vertex[j, b]
-            fan[1, b], fan[2, b] = vertex[second, b], vertex[third, b]
+            fan[1, b], fan[2, b] = vertex[j2, b], vertex[j3, b]
         for b in range(2):
             fan_corner[0, b] = (1 - along) * corner[i, b] + along * corner[j, b]
-            fan_corner[1, b], fan_corner[2, b] = corner[second, b], corner[third, b]
+            fan_corner[1, b], fan_corner[2, b] = corner[j2, b], corner[j3, b]
         table, count = _put_fan(table, count, number, fan, fan_corner, share * part, s, ws, t, wt)
     return table, count
 
 
 @kernel
 def triangle_points(  # type: ignore[no-untyped-def]
-    bary, corners, share, bears_tip, fan, tips, levels, plain, plain_share, near, near_share,
+    bary, corners, share, bears_tip, fan, tips, levels, plain_rule, plain_share, near, near_share,
     s, ws, t, wt,
 ):  # fmt: skip
     """Integration points of triangles, denser towards tips where their functions act.
@@ -517,7 +520,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
     tips : (m, 2) array
     levels : int
         Most bisections.
-    plain, plain_share : (p, 3) and (p,) arrays
+    plain_rule, plain_share : (p, 3) and (p,) arrays
         Rule of triangles without tip functions.
     near, near_share : (p, 3) and (p,) arrays
         Rule of those with tip functions that lie away from tips.
@@ -537,7 +540,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
     table, count = np.empty((len(bary) * len(plain_share), 5)), 0
     for k in range(len(bary)):
         if not bears_tip[k]:
-            table, count = _put_rule(table, count, k, bary[k], share[k], plain, plain_share)
+            table, count = _put_rule(table, count, k, bary[k], share[k], plain_rule, plain_share)
             continue
         if fan[k]:
             table, count = _put_fan(
@@ -565,11 +568,11 @@ def triangle_points(  # type: ignore[no-untyped-def]
                         vertex[i, b] += part[i, v] * bary[k, v, b]
                     for j in range(2):
                         corner[i, j] += part[i, v] * corners[k, v, j]
-            size, closest, least = _longest_side(corner), 0, np.inf
+            size, tip_of_part, least = _longest_side(corner), 0, np.inf
             for m in range(len(tips)):
-                away = _distance(tips[m, 0], tips[m, 1], corner)
-                if away < least:
-                    closest, least = m, away
+                distance = _distance(tips[m, 0], tips[m, 1], corner)
+                if distance < least:
+                    tip_of_part, least = m, distance
             # Equal lengths are common in regular meshes: round-off must not decide.
             if size <= (1.0 + _SAME) * least:
                 table, count = _put_rule(table, count, k, vertex, fraction, near, near_share)
@@ -577,7 +580,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
             if level == levels:
                 table, count = _put_fans_around(
                     table, count, k, vertex, corner, fraction,
-                    tips[closest], s, ws, t, wt, one, one_corner,
+                    tips[tip_of_part], s, ws, t, wt, one, one_corner,
                 )  # fmt: skip
                 continue
             for i in range(3):

@@ -349,8 +349,8 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
 
 @kernel
 def add_lips(  # type: ignore[no-untyped-def]
-    total, xi, outward, side, weight, pressure, shear, gradient, steady, turn, radii, inner, frame,
-    modes, kolosov, lam, mu,
+    total, xi, outward_normal, side, weight, pressure, shear, gradient, steady, turn, radii, inner,
+    frame, modes, kolosov, lam, mu,
 ):  # fmt: skip
     """Add the full lip term of each state, domain and field.
 
@@ -360,7 +360,7 @@ def add_lips(  # type: ignore[no-untyped-def]
         As of `add_points`.
     xi : (n, 2) array, length
         Places from the tip, in its frame.
-    outward : (n, 2) array
+    outward_normal : (n, 2) array
         Normals of lip - in the frame, out of the body.
     side : (2, n) array of int
         Side of the crack of the points on both lips, - first.
@@ -375,15 +375,15 @@ def add_lips(  # type: ignore[no-untyped-def]
     steady : (s, 2, 2) array
         Initial stress at the tip in its frame.
     """
-    g, sigma, straight = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.zeros((2, 2))
-    straight[0, 0] = straight[1, 1] = 1.0
+    g, sigma, no_turn = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.zeros((2, 2))
+    no_turn[0, 0] = no_turn[1, 1] = 1.0
     states, n = total.shape[0], len(xi)
     local = np.empty((2, 2, states))
     for p in range(n):
         for face in range(2):
             sign = 1.0 - 2.0 * face
-            n0, n1 = sign * outward[p, 0], sign * outward[p, 1]
-            r, _, _, c, s = _place(straight, xi[p, 0], xi[p, 1], side[face, p], True)
+            n0, n1 = sign * outward_normal[p, 0], sign * outward_normal[p, 1]
+            r, _, _, c, s = _place(no_turn, xi[p, 0], xi[p, 1], side[face, p], True)
             _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
             if len(gradient) > 0:
                 _into_frame(frame, gradient[face * n + p], turn, local)
