@@ -12,7 +12,7 @@ from xcrack.base.machine import free_memory
 from xcrack.base.markup import element
 from xcrack.crack.crack import Crack, crack_length
 from xcrack.crack.measures import DEEP, area_inside, cells_deep, front_length_inside
-from xcrack.crack.stations import short_fronts
+from xcrack.crack.stations import GEOMETRY
 from xcrack.fem.enrichment import reach_of_tips
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
@@ -389,7 +389,7 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     texts = [
         f"crack {c}: {front}"
         for c, crack in enumerate(problem.cracks)
-        for front in short_fronts(crack, problem.mesh)
+        for front in GEOMETRY[problem.mesh.dim].short_fronts(crack, problem.mesh)
     ]
     absence = "; ".join(texts)
     if not sum(n_tips):

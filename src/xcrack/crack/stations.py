@@ -15,19 +15,43 @@ from xcrack.crack.fronts import front_frames
 from xcrack.crack.junctions import Junction
 from xcrack.crack.junctions_3d import is_before, surface_junctions
 from xcrack.crack.placing_2d import check_lines, place_line, vertices_on_mesh
-from xcrack.crack.placing_3d import ShortFront, arms_placed, check_surfaces, place_surface
-from xcrack.crack.placing_3d import short_fronts as surface_short_fronts
+from xcrack.crack.placing_3d import (
+    ShortFront,
+    arms_placed,
+    check_surfaces,
+    place_surface,
+    short_fronts,
+)
 from xcrack.mesh.locate import contains
 from xcrack.mesh.mesh import Mesh
 
 # Cracks put into a mesh: what of them is tip or front, what is mouth, and whether they meet.
 
-CutEnds = tuple[Sequence[Floats], Sequence[Floats]]
+CutEnds = tuple[Sequence[Floats] | Floats, Sequence[Floats] | Floats]
 
 
 @dataclass(frozen=True)
-class _Geometry:
-    """What lines in a plane body and surfaces in space do in ways of their own."""
+class Geometry:
+    """What lines in a plane body and surfaces in space do in ways of their own.
+
+    Attributes
+    ----------
+    place : callable
+        As `place_crack`, which looks at the dimensions first.
+    check : callable
+        Raises where placed cracks cross or touch, or their ends are closer than a cell.
+    on_others : callable (cracks as given, placed cracks, mesh)
+        Placed cracks, of which some end on others.
+    junctions : callable
+        Where placed cracks do.
+    on_mesh : callable
+        A placed crack as the mesh is cut by it.
+    short_fronts : callable
+        Fronts of a crack, not placed yet, that a mesh is too coarse for; none in 2D.
+    end_frames : callable
+        Of a placed crack: points of each tip `(2,)` or front `(m, 3)`, and frames there with rows
+        (ahead, normal), in 3D (ahead, normal, along).
+    """
 
     place: Callable[[Crack, Mesh], Crack]
     check: Callable[[tuple[Crack, ...], Mesh], None]
@@ -38,35 +62,31 @@ class _Geometry:
     end_frames: Callable[[Crack], CutEnds]
 
 
-def _tips(crack: Crack) -> CutEnds:
-    x, frame = tip_frames(crack)
-    return list(x), list(frame)
-
-
 def _fronts(crack: Crack) -> CutEnds:
     fronts = front_frames(crack)
     return [front.x for front in fronts], [front.frame for front in fronts]
 
 
-_LINES = _Geometry(
-    place_line,
-    check_lines,
-    junctions_2d.on_others,
-    junctions_2d.junctions,
-    on_mesh=vertices_on_mesh,
-    short_fronts=lambda crack, mesh: [],
-    end_frames=_tips,
-)
-_SURFACES = _Geometry(
-    place_surface,
-    check_surfaces,
-    arms_placed,
-    surface_junctions,
-    on_mesh=lambda crack, mesh: crack,
-    short_fronts=surface_short_fronts,
-    end_frames=_fronts,
-)
-_GEOMETRY = {2: _LINES, 3: _SURFACES}
+GEOMETRY = {
+    2: Geometry(
+        place_line,
+        check_lines,
+        junctions_2d.on_others,
+        junctions_2d.junctions,
+        on_mesh=vertices_on_mesh,
+        short_fronts=lambda crack, mesh: [],
+        end_frames=tip_frames,
+    ),
+    3: Geometry(
+        place_surface,
+        check_surfaces,
+        arms_placed,
+        surface_junctions,
+        on_mesh=lambda crack, mesh: crack,
+        short_fronts=short_fronts,
+        end_frames=_fronts,
+    ),
+}
 
 
 def place_crack(crack: Crack, mesh: Mesh) -> Crack:
@@ -90,56 +110,7 @@ def place_crack(crack: Crack, mesh: Mesh) -> Crack:
     """
     if crack.dim != mesh.dim:
         raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
-    return _GEOMETRY[mesh.dim].place(crack, mesh)
-
-
-def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
-    """Fronts of a crack, not placed yet, that this mesh is too coarse for; none in 2D.
-
-    Parameters
-    ----------
-    crack : Crack
-    mesh : Mesh
-
-    Returns
-    -------
-    list of ShortFront
-    """
-    return _GEOMETRY[mesh.dim].short_fronts(crack, mesh)
-
-
-def check_cracks(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
-    """Raise where placed cracks cross or touch, or their ends are closer than a cell.
-
-    Parameters
-    ----------
-    cracks : tuple of Crack
-        Placed in the mesh.
-    mesh : Mesh
-
-    Raises
-    ------
-    GeometryError
-        The message names the cracks and the place.
-    """
-    _GEOMETRY[mesh.dim].check(cracks, mesh)
-
-
-def on_others(
-    given_cracks: Sequence[Crack], cracks: tuple[Crack, ...], mesh: Mesh
-) -> tuple[Crack, ...]:
-    """Placed cracks that end on others; see `on_others` in 2D and `arms_placed` in 3D."""
-    return _GEOMETRY[mesh.dim].on_others(given_cracks, cracks, mesh)
-
-
-def on_mesh(crack: Crack, mesh: Mesh) -> Crack:
-    """A placed crack as the mesh is cut by it; see `placing_2d.vertices_on_mesh`."""
-    return _GEOMETRY[mesh.dim].on_mesh(crack, mesh)
-
-
-def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
-    """Where placed cracks end on others; see `junctions_2d.junctions`."""
-    return _GEOMETRY[mesh.dim].junctions(cracks, mesh)
+    return GEOMETRY[mesh.dim].place(crack, mesh)
 
 
 _ON = 1e-6  # of a side of a front, by which its end may miss the boundary
@@ -237,30 +208,12 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
     )
 
 
-def end_frames(crack: Crack) -> CutEnds:
-    """Points and frames of each tip, in 3D of each front, of a placed crack.
-
-    Parameters
-    ----------
-    crack : Crack
-
-    Returns
-    -------
-    points : sequence of (2,) or (m, 3) arrays, length
-    frames : sequence of (2, 2) or (m, 3, 3) arrays
-        Rows (ahead, normal), in 3D (ahead, normal, along).
-    """
-    return _GEOMETRY[crack.dim].end_frames(crack)
-
-
 __all__ = [
+    "GEOMETRY",
+    "Geometry",
     "Stations",
-    "check_cracks",
-    "end_frames",
-    "junctions",
-    "on_mesh",
-    "on_others",
+    "inside_body",
+    "part_inside",
     "place_crack",
-    "short_fronts",
     "stations_of",
 ]

@@ -14,7 +14,7 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.crack.stations import end_frames
+from xcrack.crack.stations import GEOMETRY
 from xcrack.fem.cut import Cut
 from xcrack.fem.enrichment import (
     divided_points,
@@ -388,7 +388,7 @@ def function_space(
     radii = tip_radii(mesh, cracks, cuts, order, numerics.radius, meeting)
     tips = []
     for c, cut in enumerate(cuts):
-        x, frame = end_frames(cracks[c])
+        x, frame = GEOMETRY[mesh.dim].end_frames(cracks[c])
         flags = [
             tip_points(mesh, order, cut, k, radii[c][k], numerics.enrichment)
             for k in range(cut.n_tips)

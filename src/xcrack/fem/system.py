@@ -6,7 +6,7 @@ from typing import Any
 
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import prolonged_cracks
-from xcrack.crack.stations import on_mesh
+from xcrack.crack.stations import GEOMETRY
 from xcrack.fem import joints_2d, joints_3d
 from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
 from xcrack.fem.cut import cut
@@ -88,7 +88,7 @@ def build(problem: Problem, bulk_: Bulk | None = None) -> System:
 def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
     """Function space of a problem, and the points on the faces of its cracks: nothing assembled."""
     mesh, numerics = problem.mesh, problem.numerics
-    cracks = tuple(on_mesh(crack, mesh) for crack in problem.placed)
+    cracks = tuple(GEOMETRY[mesh.dim].on_mesh(crack, mesh) for crack in problem.placed)
     junctions = problem.junctions
     level_set_cracks = (
         prolonged_cracks(cracks, junctions) if junctions and mesh.dim == 2 else cracks

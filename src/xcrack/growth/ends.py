@@ -25,6 +25,7 @@ from xcrack.growth.step import (
 )
 from xcrack.growth.validity import ahead_of
 from xcrack.mesh.locate import cell_extents
+from xcrack.sif.sif import at_stations
 
 # Ligaments in front of the tips of 2D cracks, and whether plastic zones fill them.
 
@@ -296,7 +297,7 @@ def beyond_end(rule: GrowthRule, step: Step, is_break: bool) -> float:
 
 def _same_states(step: Step) -> str:
     """What to say where K is the same in all load states; empty where it is not, or is zero."""
-    K = np.stack([np.concatenate([sif.K for sif in state]) for state in step.sif])
+    K = at_stations(step.sif, "K")
     size = float(np.abs(K).max(initial=0.0))
     if len(K) < 2 or size == 0 or float(np.ptp(K, axis=0).max(initial=0.0)) > _SAME * size:
         return ""

@@ -212,8 +212,9 @@ def _arriving_tips(
     """Tips that have left the body, and the part of their straight way that lies inside."""
     result = []
     for c, pair in enumerate(zip(advanced_cracks, placed_cracks, strict=True)):
-        start = _starts(last, advanced_cracks, c)
-        for j in _tips_outside(*pair):
+        numbers = _tips_outside(*pair)
+        start = _starts(last, advanced_cracks, c) if numbers else np.zeros((0, 2))
+        for j in numbers:
             move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
             way = float(np.linalg.norm(move))
             hit = exit_ahead(start[j], move / way, mesh) if way > 0 else None

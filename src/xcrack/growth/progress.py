@@ -39,11 +39,14 @@ class Progress:
         """Tell of a step as soon as it is finished."""
         time_now = time.perf_counter()
         since = 0.0 if self._cycles is None else step.cycles - self._cycles
-        line = _line(self.run, step)
-        time_left = _time_left(self.run, step, since, time_now - self._begin)
+        seconds = time_now - self._begin
         self._begin, self._cycles = time_now, step.cycles
+        is_shown = _is_wanted(self.run)
+        if not is_shown and not _LOG.isEnabledFor(logging.INFO):
+            return
+        line, time_left = _line(self.run, step), _time_left(self.run, step, since, seconds)
         _LOG.info("%s%s", line, time_left)
-        if not _is_wanted(self.run):
+        if not is_shown:
             return
         if self._bar is None and self.run.progress != "always":
             self._bar = _new_bar(self.run, step)
@@ -103,8 +106,10 @@ def _time_left(run: GrowthRule, step: Step, cycles: float, seconds: float) -> st
 
 def _is_wanted(run: GrowthRule) -> bool:
     """Whether lines are asked for, or standard error is a terminal or a cell of a notebook."""
+    if run.progress is not True:
+        return run.progress == "always"
     notebook = in_notebook() or type(sys.stderr).__module__.startswith("ipykernel")
-    return run.progress == "always" or (run.progress is True and (notebook or sys.stderr.isatty()))
+    return notebook or sys.stderr.isatty()
 
 
 # Warnings of a run: each kind when it comes first, and one summary of those that came again.

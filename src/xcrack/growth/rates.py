@@ -22,6 +22,7 @@ from xcrack.growth.response import Answers, Response
 from xcrack.growth.stations import PerCrack, directions, solved_stations, split
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem
+from xcrack.sif.sif import at_stations
 
 PLACE = {2: "tip", 3: "front place"}  # what a station is called in messages
 
@@ -129,12 +130,12 @@ class Rates:
     @cached_property
     def K(self) -> Floats:
         """Factors in all states `(s, n, 2 or 3)`, stress √length."""
-        return np.stack([np.concatenate([sif.K for sif in state]) for state in self.sif])
+        return at_stations(self.sif, "K")
 
     @cached_property
     def T(self) -> Floats:
         """Stress along the faces in all states `(s, n)`."""
-        return np.stack([np.concatenate([sif.T for sif in state]) for state in self.sif])
+        return at_stations(self.sif, "T")
 
     @property
     def size_of_law(self) -> Floats:
@@ -341,8 +342,7 @@ def _at_rest(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     A crack along the axis of a pressed body has K = 0: what a solve finds of it is its error, and
     a crack that grew on that would need 1e20 cycles, and turn to and fro.
     """
-    opening = [np.concatenate([each.K_I > 0 for each in state]) for state in response.sif]
-    is_closed = ~np.any(opening, axis=0)
+    is_closed = ~np.any(at_stations(response.sif, "K_I") > 0, axis=0)
     if not response.solutions or not is_closed.any():
         return np.zeros(len(dK_eq), dtype=bool)
     stress = mean_stress(response.solutions)
@@ -365,7 +365,7 @@ def _is_locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     rubbing_cracks = [c for c in range(len(parts)) if has_slip(solutions[0], c)]
     if rubbing_cracks:
         nu = problem.elasticity.poisson_at(np.concatenate([each.x for each in sif[0]]))
-        K = clipped_K(np.stack([np.concatenate([each.K for each in state]) for state in sif]))
+        K = clipped_K(at_stations(sif, "K"))
         largest = float(local_equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
         split_ranges = split(dK_eq, [len(part) for part in parts])
     for c in rubbing_cracks:

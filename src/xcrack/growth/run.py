@@ -277,7 +277,8 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                     break
                 is_torn = is_torn or _warn_of_mode_III(next_rule, next_step)
                 count = len(messages)
-                other = plan_again(first_rule, next_rule, cut, next_step)
+                again = next_rule.estimates
+                other = plan_again(first_rule, next_rule, cut, next_step) if again else None
                 if other is not None:
                     del messages[:count]  # of a step that is not handed over
                 else:
@@ -554,7 +555,7 @@ def _solved_step(
         N = 0.0 if last is None else last.cycles + plan_of(last).cycles
         response = respond_under_program(rule, problem, reuse, rule.estimates, N)
     sif, solutions, handed_on = response.sif, response.solutions, response.reuse
-    rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
+    rates = rates_of(rule, problem, sound_copy(response, sif=best_K(sif)))
     integrator = integrator_of(rule)
     if last is None:
         index, radius = 0, rule.problem.numerics.radius
@@ -574,7 +575,7 @@ def _solved_step(
                 break
             response = response.scaled(sqrt(change))  # half of it: fewer cycles, smaller loads
             sif, solutions = response.sif, response.solutions
-            rates = rates_of(rule, problem, replace(response, sif=best_K(sif)))
+            rates = rates_of(rule, problem, sound_copy(response, sif=best_K(sif)))
             result = correct(rule, last, rates, identities)
     result = add_K_error(rule, last, result, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)

@@ -30,14 +30,7 @@ from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.measures import crack_size
-from xcrack.crack.stations import (
-    Stations,
-    check_cracks,
-    junctions,
-    on_others,
-    place_crack,
-    stations_of,
-)
+from xcrack.crack.stations import GEOMETRY, Stations, place_crack, stations_of
 from xcrack.mesh.mesh import Mesh, warn_of_sets
 from xcrack.model.elasticity import Elasticity, elasticity
 from xcrack.model.loads import Load
@@ -295,8 +288,9 @@ class Problem(Declared):
             The mesh is too coarse for them.
         """
         cracks = tuple(place_crack(crack, self.mesh) for crack in self.cracks)
-        cracks = on_others(self.cracks, cracks, self.mesh)
-        check_cracks(cracks, self.mesh)
+        geometry = GEOMETRY[self.mesh.dim]
+        cracks = geometry.on_others(self.cracks, cracks, self.mesh)
+        geometry.check(cracks, self.mesh)
         return cracks
 
     @cached_property
@@ -312,7 +306,7 @@ class Problem(Declared):
     @cached_property
     def junctions(self) -> tuple[Junction, ...]:
         """In 2D: where cracks end on others."""
-        return junctions(self.placed, self.mesh)
+        return GEOMETRY[self.mesh.dim].junctions(self.placed, self.mesh)
 
     @property
     def frictions(self) -> tuple[float, ...]:

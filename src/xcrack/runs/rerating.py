@@ -207,7 +207,7 @@ class DrivingForce:
     @property
     def lead(self) -> "DrivingForce":
         """The driving place of each step only, and the cycles of the steps that have one."""
-        names = ("step", "is_driving", "place", "da", "a", "rate", "size", "spread", "dK", "R", "count")
+        names = "step is_driving place da a rate size spread dK R count".split()
         parts = {name: getattr(self, name)[self.is_driving] for name in names}
         return replace(self, **parts, cycles=self.cycles[self.step[self.is_driving]])
 

@@ -25,7 +25,7 @@ from xcrack.linalg.engine import SlipField, SolverState
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.mesh import Mesh, sound_mesh
 from xcrack.mesh.polygon import Arc
-from xcrack.sif.sif import SIF, KErrors, SurfaceEnd
+from xcrack.sif.sif import SIF, KErrors, SurfaceEnd, at_stations
 
 Arrays = dict[str, NDArray[Any]]
 Value = TypeVar("Value")
@@ -195,10 +195,7 @@ def _pack_sif(states: Sequence[Sequence[SIF]]) -> Arrays:
     count = _counts([sif.x for sif in first])
     result: Arrays = {"crack": np.repeat(np.arange(len(first)), count)}
     result |= {n: np.concatenate([getattr(sif, n) for sif in first]) for n in _OF_PLACES}
-    result |= {
-        n: np.stack([np.concatenate([getattr(sif, n) for sif in state]) for state in states])
-        for n in _OF_STATES
-    }
+    result |= {name: at_stations(states, name) for name in _OF_STATES}
     every = [[sif for sif in state] for state in states]
     if any(sif.widened is not None for state in every for sif in state):
         result["has_widened"] = np.array([[s.widened is not None for s in row] for row in every])

@@ -38,6 +38,12 @@ class KErrors:
     contact: Floats | None = None
 
 
+def at_stations(answers: Sequence[Sequence["SIF"]], name: str) -> Floats:
+    """Values of all states and cracks `(s, n, ...)`, by the name of an attribute."""
+    rows = [np.concatenate([getattr(sif, name) for sif in state]) for state in answers]
+    return np.stack(rows)
+
+
 def no_bars(shape: tuple[int, ...], reason: str) -> KErrors:
     """No estimate at any place, for one reason."""
     nothing = lock(np.full(shape, np.nan))
