@@ -236,7 +236,7 @@ def test_checks_of_both_dimensions_go_by_one_name():
     cube = xc.box((-1, -1, -1), (1, 1, 1), 8)
     pennies = [xc.penny_crack((0, 0, z), (0, 0, 1), 0.5) for z in (0.03, 0.05)]
     with pytest.raises(xc.GeometryError, match="closer than a cell"):
-        xc.Problem(cube, xc.Isotropic(E=1.0, nu=0.3), pennies)
+        _ = xc.Problem(cube, xc.Isotropic(E=1.0, nu=0.3), pennies).placed
     lines = [xc.line_crack([(-0.2, y), (0.2, -y)]) for y in (0.1, -0.1)]
     with pytest.raises(xc.GeometryError, match=r"cracks 0 and 1 cross near \[0.0, 0.0\]"):
-        xc.Problem(BOX, xc.Isotropic(E=1.0, nu=0.3, plane="strain"), lines)
+        _ = xc.Problem(BOX, xc.Isotropic(E=1.0, nu=0.3, plane="strain"), lines).placed

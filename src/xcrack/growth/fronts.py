@@ -141,7 +141,7 @@ def front_lengths(crack: Crack) -> Floats:
 def _solved_fronts(
     rule: GrowthRule, rates: Rates, identities: Identities, sigma: float
 ) -> tuple[GrowthStations, SolveHistory]:
-    """All fronts as they were solved."""
+    """Stations and solves of all fronts at which K was solved."""
     at = rates.stations
     n = len(at)
     angle, is_closed, length = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n)
@@ -186,7 +186,7 @@ def _corrected_part(
     stations_before: GrowthStations,
     growth_owed: Floats,
 ) -> tuple[GrowthStations, SolveHistory]:
-    """Stations of a corrected crack, with what was solved close by."""
+    """Stations of a corrected crack, with rates interpolated from those solved close by."""
     stations_here, solves = solved_part
     crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
@@ -403,7 +403,7 @@ def advanced_crack(
 def _waves(
     stations: GrowthStations, solves: SolveHistory, advance: Floats
 ) -> list[tuple[Ints, FrontWaves | None]]:
-    """Rows of each front, and how its advance answers to its own change of shape."""
+    """Rows of each front, and its response: how rates change with the shape of the front."""
     result = []
     for end in np.unique(stations.crack * 10**6 + stations.front):
         rows = np.nonzero(stations.crack * 10**6 + stations.front == end)[0]
@@ -453,10 +453,7 @@ def begin_at(
     error: StepError,
     last: Step | None = None,
 ) -> Corrected:
-    """A step before which there is nothing to correct.
-
-    What overloads have left since the step before, `last`, is that of the nearest place.
-    """
+    """A first step, or a restart with the overload zones that `last` had at the nearest places."""
     stations, solves = _solved_fronts(rule, rates, identities, 0.0)
     zones = None if rule.retardation is None else no_zones(len(stations))
     if zones is not None and last is not None:
@@ -587,7 +584,7 @@ def _corrected_crack(
     share: Floats,
     later_direction: Floats,
 ) -> tuple[Crack, Floats, Floats, Floats] | None:
-    """The corrected crack, growth that waits at the old places, how far these are moved, and grow.
+    """The corrected crack; at the old places the growth that waits, their moves and their growth.
 
     None where the crack that was solved has other fronts: there is nothing to correct.
     """
@@ -629,7 +626,7 @@ def _corrected_crack(
 
 
 def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple[Floats, ...]:
-    """Estimated error of the places that were solved, with what this step adds."""
+    """Errors of the places of the stations, with the part that this step adds."""
     stations, mesh = solves_of(last)[0], rates.problem.mesh
     result = []
     for c in range(len(rates.cracks)):
@@ -652,9 +649,9 @@ def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple
 def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
     """Cycles of a step by the largest rates at both ends, and what they add to the error.
 
-    All places advance in proportion to these, and without the response of the front: so the
-    scatter of the largest of many rates costs nothing. The rate is taken as a power of the size of
-    the crack, which is proportional to the advance within the step.
+    The largest rate alone counts cycles: all places advance in proportion to it, so that its
+    scatter along the front costs nothing. It is a power of the crack size, which grows linearly
+    with the advance within the step.
     """
     plan, (stations, solves) = plan_of(last), solves_of(last)
     c = int(stations.crack[plan.tip])
@@ -672,10 +669,7 @@ def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
 
 
 def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | None:
-    """Cycles of a step in which a front has passed an interface of materials; None elsewhere.
-
-    Of the place that drives: the others pass with it.
-    """
+    """Cycles of a step in which the fastest place has passed an interface; None elsewhere."""
     plan, (stations, solves) = plan_of(last), solves_of(last)
     interfaces, row = whole_front_ahead(rule, stations.x, plan.move), plan.tip
     if interfaces is None or not plan.arc[row] > interfaces.way[row]:
@@ -735,7 +729,7 @@ def _all_zones(parts: Sequence[OverloadZones]) -> OverloadZones:
 def _with_mean_rates(
     rule: GrowthRule, stations: GrowthStations, solves: SolveHistory, zones: OverloadZones | None
 ) -> SolveHistory:
-    """The same with rates that are means over the step ahead, as K at its begin leads to.
+    """Solves whose rates are means over the step ahead, by K at its begin and overloads.
 
     All are 0 where the growths of a step take more cycles than can be counted.
     """
@@ -761,7 +755,7 @@ def _overloads_between(
     rates: Rates,
     parts_here: Sequence[tuple[GrowthStations, SolveHistory]],
 ) -> tuple[Floats, float, OverloadZones]:
-    """Growth of the stations of a step with K between that of its begin and that of its end.
+    """Growth under overloads in a step, with K interpolated between its begin and its end.
 
     Returns
     -------
@@ -791,7 +785,7 @@ def _overloads_between(
 
 
 def _zones_after(rule: GrowthRule, last: Step, x: Floats) -> OverloadZones:
-    """What overloads have left at places that some of the stations of a step have come to."""
+    """Overload zones at the new places of some of the stations of a step."""
     plan, (stations, solves) = plan_of(last), solves_of(last)
     assert last.zones is not None
     ones_of_stations, length = np.ones(len(stations)), plan.part * plan.length
@@ -803,19 +797,19 @@ def _zones_after(rule: GrowthRule, last: Step, x: Floats) -> OverloadZones:
 
 
 def rate_at_end(rate: Floats, arc: Floats, blocks: float) -> Floats:
-    """Rates that, as a mean with those of the begin, let stations grow by an arc in some blocks."""
+    """Rates at the end of a step whose mean with those of the begin is arc over blocks."""
     return np.maximum(2 * arc / blocks - rate, 0.0)
 
 
 def beyond_trapezoid(blocks: float, expected_blocks: float) -> float:
-    """Blocks of a step by a power of the rates at both ends, against the mean of their inverses."""
+    """Blocks by a power law between both rates, less those by the mean of their inverses."""
     return abs(0.5 * (expected_blocks + blocks**2 / expected_blocks) - blocks)
 
 
 def zones_onto(
     zones: OverloadZones, arc: Floats, way: Floats, moved_x: Floats, x: Floats
 ) -> OverloadZones:
-    """What overloads have left, at the places of the next front.
+    """Overload zones at the places of the next front.
 
     Parameters
     ----------

@@ -313,7 +313,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
 
 
 def steps_to_go_on_from(rule: GrowthRule, steps_done: Sequence[Step]) -> Sequence[Step]:
-    """Steps of a run without the last ones, if these were cut short for an end that is none now."""
+    """Stored steps without the last ones, if these were shortened for an end that has changed."""
     if steps_done and end_of_run(rule, steps_done[-1]):
         return steps_done
     while len(steps_done) > 1 and steps_done[-1].run is not None and steps_done[-1].run.cut:
@@ -322,7 +322,7 @@ def steps_to_go_on_from(rule: GrowthRule, steps_done: Sequence[Step]) -> Sequenc
 
 
 def _with_mark(step: Step) -> Step:
-    """A step that is shorter than planned, for an end that comes."""
+    """The step, marked as shorter than planned because the run ends."""
     return step if step.run is None else replace(step, run=replace(step.run, cut=True))
 
 
@@ -393,10 +393,9 @@ _SAME = 1e-10  # of a length that was asked for
 
 
 def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
-    """A step whose way ahead ends where a crack is as long as asked for; the same where none is.
+    """A step shortened to end where a crack has the size `max_size`, found from the cracks alone.
 
-    The cracks alone say that: nothing is solved. Where less than a tenth of a cell would be left
-    behind it, this step leaves that much.
+    A rest of less than a tenth of a cell is avoided: then this step leaves that much.
     """
     from scipy.optimize import brentq
 
@@ -431,7 +430,7 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
 
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
-    """A step with a shorter way ahead, of which the advance of its stations is a share."""
+    """A step with a shorter plan; the advance of its stations is reduced in proportion."""
     shorter_step = _with_plan(rule, sound_copy(step, control=replace(step.control, length=length)))
     plan, plan_before = plan_of(shorter_step), plan_of(step)
     share = plan.largest / plan_before.largest if plan_before.largest > 0 else 1.0
@@ -534,7 +533,7 @@ def _solved_step(
 ) -> tuple[Step, SolverState]:
     """Solve all load states of a problem and decide where and how fast its cracks grow.
 
-    Where it may foretell the bars of K, they are those of the last solve, a little wider.
+    With `may_foretell`, bars of K may be those of the last solve, a little wider.
     """
     is_foretold = False
     if may_foretell and last is not None and not joins_of_step and bars_are_foretold(rule, last):

@@ -86,7 +86,7 @@ _FASTER = 2.0  # times the last rate: what a step of prescribed cycles may recko
 
 
 def predict(rule: GrowthRule, step: Step) -> Plan:
-    """Where the last two solves lead; from a first one straight on, at its rates."""
+    """The next step, by the rates of the last two solves or of the only one."""
     stations, solves = solves_of(step)
     cell = cell_sizes(rule.problem.mesh, stations.x)
     rate = np.concatenate([np.zeros(0), *step.rate])
@@ -131,7 +131,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
 
 
 def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
-    """The next piece of σ, and whether all growth is seen to stop at its end."""
+    """The next step of σ without regard to boundaries, and whether all tips stop growing in it."""
     solves = solves_of(step)[1]
     last_solves = solves.last(2)
     length = longest(rule, step.control)
@@ -158,10 +158,7 @@ def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
 def _up_to_interfaces(
     rule: GrowthRule, step: Step, interfaces: InterfacesAhead, stretch: Stretch, growth: Growth
 ) -> tuple[Stretch, Growth]:
-    """A step that ends before an interface of materials, or behind it: its piece of σ, and growth.
-
-    Behind it the rates are those of the law there, at the K that is known before it.
-    """
+    """A step that ends before an interface, or behind it with the law there at the last known K."""
     stations, solves = solves_of(step)
     history = solves.last(2)
     goal = np.where(growth.arc > interfaces.stop, interfaces.goal, np.inf)
@@ -190,10 +187,9 @@ def _up_to_interfaces(
 def _up_to_boundary(
     rule: GrowthRule, step: Step, stretch: Stretch, growth: Growth
 ) -> tuple[Stretch, Growth]:
-    """A step that ends when the first tip arrives at the boundary, where others go on.
+    """A step that ends as the first tip reaches the boundary: K of the others jumps there.
 
-    Also where it would end so close before it that the mesh takes it for a mouth: K of the others
-    jumps as it leaves, so that no step spans that. The last tips are as far as their ligament says.
+    A tip so close to the boundary that the mesh takes it for a mouth has reached it.
     """
     stations, mesh = solves_of(step)[0], rule.problem.mesh
     if len(stations) < 2:
@@ -227,7 +223,7 @@ def _growth(stations: GrowthStations, stretch: Stretch, length: float | None = N
 def _step_to_meeting(
     rule: GrowthRule, step: Step, plan: Plan, stretch: Stretch, meetings_ahead: list[Meeting]
 ) -> Plan:
-    """A step that ends when the first tip meets another crack, and the cracks joined there."""
+    """A step that ends as the first tip meets another crack, with the cracks joined there."""
     stations = solves_of(step)[0]
     faces = last_faces(plan.cracks)
     directions = np.stack([np.cos(faces.direction), np.sin(faces.direction)], axis=1)
@@ -281,10 +277,10 @@ def _step_to_meeting(
 
 
 def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> tuple[Growth, float]:
-    """Growth until two facing tips have met, and what is unsure of its cycles.
+    """Growth until two facing tips have met, and the uncertainty of its cycles.
 
-    No polynomial through solves before follows K in the last of a gap: its time is that of two
-    equal cracks that face each other. The other tips come as far as they can in that.
+    K rises faster in a closing gap than polynomials through earlier solves: the cycles are those
+    of two equal cracks that face each other, and the other tips grow for as long.
     """
     facing_pairs = [meeting for meeting in meetings_now if meeting.other >= 0]
     if not facing_pairs or step.zones is not None:
@@ -312,13 +308,13 @@ def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> t
 
 
 def _radii(step: Step) -> Floats:
-    """Half the length of the crack of each tip, or all of it where it has but one tip `(n,)`."""
+    """Half the length of each tip's crack, or its whole length where it has one tip `(n,)`."""
     half = [size / max(crack.n_tips, 1) for size, crack in zip(step.sizes, step.cracks)]
     return np.repeat(half, [crack.n_tips for crack in step.cracks])
 
 
 def _arrival(gap_left: Callable[[float], float], largest_length: float) -> float:
-    """Length of σ after which nothing is left of a way; inf where that takes too long."""
+    """Step of σ after which a distance left is 0; inf where a step is too short for that."""
     if gap_left(largest_length) > 0:
         return np.inf
     return bisected_length(lambda length: gap_left(length) > 0, largest_length)[1]
@@ -408,7 +404,7 @@ def first_solves(rule: GrowthRule, rates: Rates) -> SolveHistory:
 def _kink(
     inputs: CriterionInput, turns: Bools, rates: Rates, rows: Ints
 ) -> tuple[Floats, Floats, Bools]:
-    """Limit angle of the kinks of a crack, T/K_I behind them, and where they are known."""
+    """Limit angles of kinks at the tips of a crack, T/K_I behind them, and where both are known."""
 
     def without_warning(K: Floats) -> Floats:
         with collected_warnings([]):
@@ -510,10 +506,10 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
 def _step_through_interface(
     rule: GrowthRule, last: Step, rates: Rates, identities: Identities, interfaces: InterfacesAhead
 ) -> Corrected:
-    """A step in which tips have passed into other materials: each part counts by its own law.
+    """A step in which tips have passed an interface: each part counts by the law of its material.
 
-    Where only the laws differ, K is known on both sides, and is a power of the length between.
-    Where K jumps, it is prolonged up to the interface, and is that of its end behind.
+    Where only the laws differ, K is a power of the length between both solves. Where the stiffness
+    differs, K is extrapolated up to the interface, and behind it is that at the end of the step.
     """
     plan, error = plan_of(last), _error(last)
     stations, old_solves = solves_of(last)
@@ -603,7 +599,7 @@ def _step_through_interface(
 
 
 def _with_jumps(solves: SolveHistory, jumps: Bools, k: int) -> SolveHistory:
-    """The same where the cycles of a block at some tips are those of one of its solves."""
+    """Solves whose cycles of a block, at some tips, are those of one of the solves."""
     kinds = solves.kinds
     if kinds is None:
         return solves
@@ -711,9 +707,9 @@ def _room(
     rates: Rates,
     cycles: float = 0.0,
 ) -> tuple[float, float]:
-    """Shortest step of the fastest tip, and the way to the boundary ahead of it, length.
+    """Shortest step of the fastest tip, and its distance to the boundary ahead, length.
 
-    No boundary is ahead where the way to it takes next to none of the cycles so far.
+    The distance is inf where the tip would cross it in next to none of the cycles so far.
     """
     if not len(stations):
         return 0.0, np.inf
@@ -728,15 +724,15 @@ def _room(
 
 @dataclass(frozen=True, eq=False)
 class _Spans:
-    """A corrected step, and the one before, as several polynomials through solves have them.
+    """Growth in a corrected step and in the one before, by polynomials through different solves.
 
     Attributes
     ----------
     curve, line : Stretch
         The step by all solves that are known, and by the last two.
     of_step_before : tuple of Stretch
-        The step before by the last two solves then, by all that were known then, and by those of
-        now; none behind a first step, nor where retardation leaves its error unknown.
+        The step before: by the last two solves of then, by all solves of then, and by those of
+        now. Empty after the first step and where overloads make its error unknown.
     """
 
     curve: Stretch
@@ -771,7 +767,7 @@ class _PlacesError:
     Attributes
     ----------
     known_error, newest_error : (n,) arrays, length
-        What is known once and for all with it, and what the next solve tells better.
+        Parts that are final with this step, and that the next solve will replace.
     own_error : (n,) array, length
         Of this step alone.
     ahead : (2, n) array, length
@@ -791,9 +787,9 @@ def _places(
 
     Notes
     -----
-    Two polynomials span the step before: that of its own, and that of the solves up to this one.
-    The error is between them. In this step, of which no second one is known yet, it is to the
-    difference from a line as it was in that, and grows with the length.
+    The error of the step before is the difference of two polynomials: through the solves of then,
+    and through those of now. For this step only one is known: its difference from a line is scaled
+    as in the step before, and grows with the length.
     """
     plan, old_solves = plan_of(last), solves_of(last)[1]
     direction = solves.direction[-1]
@@ -829,7 +825,7 @@ def _places(
 class _CyclesError:
     """Estimated errors of the cycles: of a step alone, and two parts of that so far.
 
-    What is known once and for all with it, and what the next solve tells better.
+    `known_error` is final with this step, `newest_error` will be replaced by the next solve.
     """
 
     own_error: float
@@ -859,11 +855,10 @@ def _cycles(
 
 
 def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float) -> _CyclesError:
-    """Errors of the cycles of a step behind the second.
+    """Errors of the cycles from the third step on.
 
-    Two parabolas span the step before: that of its own, and that of the step behind it. The error
-    is between them, so that their difference takes the place of what was reckoned with then; the
-    error of this step, of which no second parabola is known yet, is taken to be smaller likewise.
+    The error of the step before is the difference of the parabolas of that step and of this one; it
+    replaces the estimate made then. The estimate of this step is reduced in the same ratio.
     """
     old_solves, cycles_before = solves_of(last)[1], _error(last).newest_cycles
     if last.zones is not None:
@@ -898,7 +893,7 @@ def _begins_of_faces(last: Step, plan: Plan) -> Floats:
 
 
 def _rows_that_stay(ends: Floats, placed_cracks: Sequence[Crack]) -> Ints:
-    """Rows of the advanced tips that the placed ones are `(n,)`: some have left or joined."""
+    """Row of each placed tip among the advanced ones `(n,)`, of which some have left or joined."""
     row = {tuple(x): k for k, x in enumerate(ends.tolist())}
     return np.array([row[tuple(x)] for x in last_faces(placed_cracks).tip.tolist()], dtype=np.int64)
 
@@ -906,10 +901,9 @@ def _rows_that_stay(ends: Floats, placed_cracks: Sequence[Crack]) -> Ints:
 def _without_lost_tips(
     rule: GrowthRule, last: Step, rates: Rates, identities: Identities, rows_that_stay: Ints
 ) -> Corrected:
-    """Begin anew after tips have left the body or met: their solves say nothing of the others now.
+    """Start anew after tips have left or met, since K of the other tips has jumped.
 
-    Up to the first exit the cycles are those that the solves before it predicted, behind it the
-    new rates count.
+    Cycles up to the first exit are as predicted; from there the new rates count.
     """
     plan, error = plan_of(last), _error(last)
     stations_before = solves_of(last)[0]
@@ -945,7 +939,7 @@ def _without_lost_tips(
 
 
 def _exit(rule: GrowthRule, last: Step, stretch_ahead: Stretch, lost_rows: Ints) -> float:
-    """Piece of σ until the first of the lost tips is outside the body; all of it where none is."""
+    """Step of σ until the first of the lost tips leaves the body; all of it where none does."""
     plan, mesh = plan_of(last), rule.problem.mesh
     stations = solves_of(last)[0]
     if _is_inside(mesh, (stations.x + plan.move)[lost_rows]):

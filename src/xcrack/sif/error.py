@@ -172,7 +172,7 @@ def _signed_near(solution: Solution, result: Estimate, x: Floats) -> Floats:
 
 
 def _inner_corners(mesh: Mesh) -> Floats:
-    """Re-entrant corners of a body in 2D `(k, 2)`; those of curves that are polygons are none."""
+    """Re-entrant corners of a body in 2D `(k, 2)`, without the corners of polygons for curves."""
     total = np.zeros(mesh.n_points)
     for i in range(3):
         a, b, c = (mesh.points[mesh.cells[:, (i + k) % 3]] for k in range(3))
@@ -189,7 +189,7 @@ def _inner_corners(mesh: Mesh) -> Floats:
 
 
 def _cells_near(solution: Solution, x: Floats) -> Bools:
-    """Whether cells are at some points `(cells,)`."""
+    """Whether each cell contains one of some points `(cells,)`."""
     mesh = solution.problem.mesh
     if not len(x):
         return np.zeros(len(mesh.cells), dtype=bool)
@@ -306,7 +306,7 @@ def _refusal_of_solution(solution: Solution, crack: int) -> str:
 
 
 def _least_at_tip(solution: Solution, crack: int, domain: Domain) -> tuple[float, float, str]:
-    """Size of cells from which on bars hold at a tip, that there, and why it is too large."""
+    """Largest cell at a tip for which bars hold, the cell there, and why it is too large."""
     least_cells = _SHORTEST[len(solution.space.tips_of(crack))]
     length, size = float(solution.lips[crack].weight.sum()), domain.size
     what = {
@@ -430,7 +430,7 @@ def _refusal_at_kinks(solution: Solution, crack: int) -> str:
 
 
 def _room_of_round_kinks(solution: Solution, crack: int) -> list[tuple[Floats, float, float]]:
-    """Of kinks that the cut rounds off as they are close to another or a tip: place, room, cell."""
+    """Kinks that the cut rounds off as too close to a kink or tip: place, distance, cell size."""
     points = solution.space.cracks[crack].points
     result = []
     for x in _round_kinks(solution, crack):
@@ -455,10 +455,7 @@ def doubts_at_kinks(solutions: Sequence[Solution], crack: int) -> list[str]:
 
 
 def _refusal_of_short_parts(solution: Solution, crack: int) -> str:
-    """Why a part of a crack at a junction or a kink is too short for an estimate, or nothing.
-
-    What the functions of its few cells cannot show, those of the surplus space cannot either.
-    """
+    """Why a part of a crack at a junction or a kink is too short for an estimate, or nothing."""
     for x, room, least_cells, size in _short_parts(solution, crack):
         if room >= least_cells * size:
             continue
@@ -599,16 +596,12 @@ def bars_beside(
 
 
 def _of_spread(sif: SIF) -> KErrors:
-    """At order 2: two domains, and hats twice as wide; K is best itself."""
+    """At order 2 bars are the spread of two domains and of hats twice as wide, about K itself."""
     return _complete_errors(sif, np.zeros_like(sif.K), _half_of_spread(sif))
 
 
 def _half_of_spread(sif: SIF) -> Floats:
-    """Half-width by two domains, and hats twice as wide.
-
-    They may agree by chance at a place: what they differ by in the root mean square along the
-    front counts at each.
-    """
+    """Half-width by two domains and by hats twice as wide, as root mean square along the front."""
     widened = np.zeros_like(sif.K) if sif.widened is None else np.array(sif.widened)
     spread = np.array(sif.spread)
     spread[sif.closed, 0] = widened[sif.closed, 0] = 0.0
@@ -665,7 +658,7 @@ def _mean(sif: SIF, values: Floats) -> Floats:
 
 
 def _complete_errors(sif: SIF, eta: Floats, bar: Floats) -> KErrors:
-    """With K_I of closed places, and without what is beside a free surface."""
+    """Errors without K_I of closed places, which is exact, and nan beside a free surface."""
     contact = np.zeros_like(bar)
     bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
     reason = (
@@ -770,7 +763,7 @@ def with_bars(
 
 
 def _of_tips(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> list[KErrors]:
-    """In 2D, from the factor."""
+    """Bars of tips in 2D, from the factor that the solve has kept."""
     if solutions[0].factored is None:
         problem, states = solutions[0].problem, [s.state for s in solutions]
         solutions = solve_states(problem, states, error=True)
