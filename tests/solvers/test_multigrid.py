@@ -12,9 +12,13 @@ from xcrack.fem.assembly import bulk, rigid_modes
 from xcrack.linalg.kernels.cycle import first_step, next_step
 from xcrack.linalg.multigrid import extended_cycle, hierarchy, largest_eigenvalue
 from xcrack.linalg.products import BorderedFactor, row_blocks, store_blocks
-from xcrack.linalg.projected_cg import Operator, conjugate_gradients
+from xcrack.linalg.projected_cg import Operator, conjugate_gradients_steps, in_lockstep
 from xcrack.mesh.simplex import node_points
 from xcrack.model.elasticity import elasticity
+
+
+def conjugate_gradients(K, b, start, *limits):
+    return in_lockstep(K, [conjugate_gradients_steps(K, b, start, *limits)])[0]
 
 
 def drawn(shape, share, seed):

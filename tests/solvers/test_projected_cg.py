@@ -20,7 +20,12 @@ from xcrack.linalg.active_set import active_set
 from xcrack.linalg.direct import system
 from xcrack.linalg.engine import ContactRows
 from xcrack.linalg.iterative import iterative_system
-from xcrack.linalg.projected_cg import Operator, conjugate_gradients, projected_solution
+from xcrack.linalg.projected_cg import (
+    Operator,
+    conjugate_gradients_steps,
+    in_lockstep,
+    projected_steps,
+)
 from xcrack.linalg.rigid_motion import balanced_loads, free_motion, without_motion
 
 
@@ -29,6 +34,10 @@ def dense(K, null=None):
     diagonal = np.diag(K).copy()
     null = np.zeros((len(K), 0)) if null is None else null
     return Operator(lambda v: K @ v, lambda r: r / diagonal, diagonal, null)
+
+
+def conjugate_gradients(K, b, start, *limits):
+    return in_lockstep(K, [conjugate_gradients_steps(K, b, start, *limits)])[0]
 
 
 def drawn(seed, n, g):
@@ -43,7 +52,9 @@ def pressed(K, b, N, d, start=True, measure=None, **options):
     flags = np.broadcast_to(np.asarray(start, dtype=bool), len(d))
     options = {"tolerance": 1e-12} | options
     y = np.zeros(len(b))
-    return projected_solution(dense(K), b, sp.csr_matrix(N), d, measure, 1.0, flags, y, **options)
+    A = dense(K)
+    run = projected_steps(A, b, sp.csr_matrix(N), d, measure, 1.0, flags, y, **options)
+    return in_lockstep(A, [run])[0]
 
 
 def by_enumeration(K, b, N, d):

@@ -394,11 +394,11 @@ def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool
         return False  # it was made for this step, or for a kink just behind it
     tolerance = float(rule.tolerance or 0.0)
     forgiven_factor = 1.0 if rule.meshes == 0 else _FORGIVEN
-    rate, turn = _errors_of_step(rule, step)
+    rate, turn = _errors_of_step(step)
     if rule.meshes and _has_no_bar(step) and _cells_for_room(rule, last) is None:
         return False
     if rule.meshes and last is not None and not _has_no_bar(step):
-        rate, turn = map(min, (rate, turn), _errors_of_step(rule, last))
+        rate, turn = map(min, (rate, turn), _errors_of_step(last))
     of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
     if last is None:
         return rate > _BEGIN * of_life or turn > _BEGIN_OF_PATH * of_path
@@ -442,11 +442,11 @@ def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
     if largest > _STRAIGHT or not np.isfinite(error.rate):
         return False
     allowance = _MARGIN * float(rule.tolerance or 0.0)
-    rate, turn = _errors_of_step(rule, last)
+    rate, turn = _errors_of_step(last)
     return rate <= SHARE * allowance and turn <= (1 - PATH) * allowance
 
 
-def _errors_of_step(rule: GrowthRule, step: Step) -> tuple[float, float]:
+def _errors_of_step(step: Step) -> tuple[float, float]:
     """Errors of rate and direction at a step by K, as they count for life and path."""
     error = step.error
     if error is None or np.isnan(error.rate):  # a finer mesh may have one

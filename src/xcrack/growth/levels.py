@@ -77,13 +77,12 @@ class LevelResponse:
 
 
 def refined_response(
-    problem: Problem, spectrum: Spectrum, first: Floats, solve: Solve, reuse: SolverState
+    spectrum: Spectrum, first: Floats, solve: Solve, reuse: SolverState
 ) -> Response:
     """Response at levels that are as dense as K and the growth of a block ask for.
 
     Parameters
     ----------
-    problem : Problem
     spectrum : Spectrum
     first : (n,) array
         Levels to begin with.
@@ -261,7 +260,7 @@ def respond_to_levels(
         factors = np.linspace(low, high, _FIRST)
     if is_exact or spectrum.levels != "auto":
         return solve(states_of(spectrum, factors), reuse)
-    return refined_response(problem, spectrum, factors, solve, reuse)
+    return refined_response(spectrum, factors, solve, reuse)
 
 
 def ladders(problem: Problem, spectrum: Spectrum, response: Response) -> list[LevelTable]:

@@ -272,10 +272,10 @@ def _norm(a: Floats) -> float:
     return float(np.sqrt(_dot(a, a)))
 
 
-def conjugate_gradients(
+def conjugate_gradients_steps(
     K: Operator, b: Floats, start: Floats, tolerance: float = TOLERANCE, limit: int = MOST_STEPS
-) -> tuple[Floats, int]:
-    """Solve K y = b, and count the steps.
+) -> Iteration[tuple[Floats, int]]:
+    """Solve K y = b, and count the steps; run by `in_lockstep`.
 
     Parameters
     ----------
@@ -293,13 +293,6 @@ def conjugate_gradients(
     ConvergenceError
         No solution after so many steps; the message carries the residual.
     """
-    return in_lockstep(K, [conjugate_gradients_steps(K, b, start, tolerance, limit)])[0]
-
-
-def conjugate_gradients_steps(
-    K: Operator, b: Floats, start: Floats, tolerance: float = TOLERANCE, limit: int = MOST_STEPS
-) -> Iteration[tuple[Floats, int]]:
-    """Run `conjugate_gradients` in lockstep with others."""
     size = _norm(b)
     if size == 0:
         return np.zeros_like(b), 0
@@ -318,7 +311,7 @@ def conjugate_gradients_steps(
     return _without_motions(K.null, descent.y), steps
 
 
-def projected_solution(
+def projected_steps(
     K: Operator,
     b: Floats,
     N: sp.csr_matrix,
@@ -329,7 +322,7 @@ def projected_solution(
     y: Floats,
     tolerance: float = TOLERANCE,
     limit: int = MOST_STEPS,
-) -> ProjectedState:
+) -> Iteration[ProjectedState]:
     """Solve K y = b + N^T lam with 0 <= lam, N y + d >= 0 and lam (N y + d) = 0.
 
     Parameters
@@ -358,23 +351,6 @@ def projected_solution(
     ConvergenceError
         No solution within so many steps or sets; the message carries residual and set.
     """
-    run = projected_steps(K, b, N, d, measure, stiffness, start, y, tolerance, limit)
-    return in_lockstep(K, [run])[0]
-
-
-def projected_steps(
-    K: Operator,
-    b: Floats,
-    N: sp.csr_matrix,
-    d: Floats,
-    measure: Floats,
-    stiffness: float,
-    start: Bools,
-    y: Floats,
-    tolerance: float = TOLERANCE,
-    limit: int = MOST_STEPS,
-) -> Iteration[ProjectedState]:
-    """Run `projected_solution` in lockstep with others."""
     N = sp.csr_matrix(N)
     weight = np.asarray(N.multiply(N) @ (1 / K.diagonal)).ravel()
     is_movable = weight > 0
