@@ -12,7 +12,6 @@ import pytest
 import xcrack as xc
 from support import scenes_3d as scenes_space
 from support.scenes_2d import numerics_of
-from xcrack.analysis.solve import build, solve_states
 
 STEEL = xc.Isotropic(1.3, 0.27)
 PULL = (xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0)))
@@ -35,36 +34,6 @@ def split_apart(**options):
     )  # fmt: skip
 
 
-def naive_stiffness(mesh, lam, mu):
-    """Plain finite elements by loops: the same sums in the same order as the kernel's."""
-    K = np.zeros((3 * mesh.n_points, 3 * mesh.n_points))
-    for e, cell in enumerate(mesh.cells):
-        G = mesh.gradient[e]
-        w = 1.0 * mesh.volume[e]
-        for a, row in enumerate(cell):
-            for b, column in enumerate(cell):
-                dot = 0.0
-                for i in range(3):
-                    dot += G[a, i] * G[b, i]
-                dot *= w * mu
-                for i in range(3):
-                    for j in range(3):
-                        K[3 * row + i, 3 * column + j] += w * (
-                            lam * G[a, i] * G[b, j] + mu * G[a, j] * G[b, i]
-                        )
-                    K[3 * row + i, 3 * column + i] += dot
-    return K
-
-
-def test_an_uncracked_body_is_plain_fem_to_the_last_bit():
-    mesh = scenes_space.perturbed(2, 71)
-    model = build(problem(mesh=mesh, supports=[xc.fix("bottom")], loads=PULL[:1]))
-    plain = naive_stiffness(mesh, STEEL.lam, STEEL.mu)
-    assert (model.stiffness.toarray() == plain).all()
-    assert model.n_points == 0
-    assert len(model.space.enriched) == 0
-
-
 @pytest.mark.parametrize("linear", SOLVERS)
 def test_choices_for_cracks_change_no_bit_without_cracks(linear):
     scene = problem(numerics=xc.Numerics(linear=linear))
@@ -84,14 +53,6 @@ def test_choices_for_cracks_change_no_bit_without_cracks(linear):
         assert plain.report.operations[name] == 0
 
 
-def test_standard_entries_do_not_know_the_crack():
-    """Entries of two standard functions are those of the uncracked body, to the last bit."""
-    plain = build(problem()).stiffness
-    n = plain.shape[0]
-    difference = (build(problem(PENNY)).stiffness[:n, :n] - plain).tocoo()
-    assert not difference.data.any()
-
-
 def test_a_through_crack_has_no_tip_functions():
     scene = split_apart()
     planned = xc.plan(scene)
@@ -106,21 +67,24 @@ def test_a_through_crack_has_no_tip_functions():
     assert solution.report["tip functions"].unknowns == 0
 
 
+def points_of(solution):
+    return solution.report.operations["integration_points"]
+
+
 def test_points_are_spent_only_where_a_function_is_no_polynomial():
     """Heaviside cells: one point a piece; plain cells none; more only where a front is near."""
-    model = build(split_apart())
-    cut = model.space.cuts[0]
-    beside = np.setdiff1d(model.space.enriched, cut.cells)
-    assert model.n_points == len(cut.sub_to_cell) + len(beside)
-    assert len(model.space.enriched) < len(model.space.mesh.cells)
-    plain = build(problem(PENNY, numerics=xc.Numerics(enrichment="topological")))
-    near = int(plain.space.has_tip.sum())
-    without = len(plain.space.enriched) - near
-    many = build(problem(PENNY, numerics=xc.Numerics(enrichment="topological", points=6)))
+    solution = xc.solve(split_apart())
+    space, cut = solution.space, solution.space.cuts[0]
+    beside = np.setdiff1d(space.enriched, cut.cells)
+    assert points_of(solution) == len(cut.sub_to_cell) + len(beside)
+    assert len(space.enriched) < len(space.mesh.cells)
+    plain, many = (
+        xc.solve(problem(PENNY, numerics=xc.Numerics(enrichment="topological", points=n)))
+        for n in (4, 6)
+    )
     # More points a direction change nothing in the cells without functions of a front.
-    assert many.n_points > plain.n_points
-    assert 0 < near
-    assert without >= 0
+    assert points_of(many) > points_of(plain)
+    assert plain.space.has_tip.any()
     assert (many.space.enriched == plain.space.enriched).all()
 
 
@@ -182,18 +146,18 @@ def test_three_states_share_one_factor_or_hierarchy(linear):
 def test_stiffness_and_levels_of_the_body_are_made_once_a_mesh():
     mesh = scenes_space.perturbed(5, 71)
     numerics = xc.Numerics(linear="iterative")
-    first = xc.solve(problem(PENNY, mesh=mesh, numerics=numerics))
+    first = xc.respond(problem(PENNY, mesh=mesh, numerics=numerics), [1.0])
     assert first.reuse.hierarchy is not None
     grown = xc.penny_crack((0.013, -0.021, 0.0317), (0.1, -0.2, 1.0), 0.6, n=24)
     scene = problem(grown, mesh=mesh, numerics=numerics)
-    again = solve_states(scene, [None], reuse=first.reuse)[0]
+    (again,) = xc.respond(scene, [1.0], first.reuse).solutions
     assert again.reuse.bulk.matrix is first.reuse.bulk.matrix
     assert again.reuse.hierarchy is first.reuse.hierarchy
     fresh = xc.solve(scene)
     assert fresh.reuse.bulk.matrix is not first.reuse.bulk.matrix
     assert (again.u == fresh.u).all()
     # Another mesh must not take it.
-    other = solve_states(problem(PENNY, numerics=numerics), [None], reuse=first.reuse)[0]
+    (other,) = xc.respond(problem(PENNY, numerics=numerics), [1.0], first.reuse).solutions
     assert other.reuse.bulk.matrix is not first.reuse.bulk.matrix
     assert other.reuse.hierarchy is not first.reuse.hierarchy
 
@@ -203,31 +167,6 @@ def test_unknowns_in_the_report_add_up():
         solution = xc.solve(problem(*cracks))
         names = ("standard functions", "Heaviside functions", "tip functions")
         assert solution.n_dof == sum(solution.report[n].unknowns for n in names)
-
-
-def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
-    import xcrack.analysis.solve
-    import xcrack.fem.system
-
-    def forbidden(*args, **options):
-        raise AssertionError("plan built something")
-
-    scene = problem(PENNY)
-    with monkeypatch.context() as patch:
-        for name in ("cut", "function_space", "bulk"):
-            patch.setattr(xcrack.fem.system, name, forbidden)
-        for name in ("system", "iterative_system"):
-            patch.setattr(xcrack.analysis.solve, name, forbidden)
-        planned = xc.plan(scene)
-    assert planned["third mode"].used
-    report = xc.solve(scene).report
-    names = [i.name for i in report.ingredients]
-    planned_names = [i.name for i in planned.ingredients if i.name != "order 1"]  # plan's alone
-    assert planned_names == names[: len(planned_names)]
-    assert {"load states", "standard functions"} <= set(names)
-    assert all(len(row.reason) > 5 for row in report.ingredients)
-    iterative = xc.solve(replace(scene, numerics=xc.Numerics(linear="iterative"))).report
-    assert iterative["linear solver"].used
 
 
 def economy():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support import scenes_3d
+from support import scenes_2d, scenes_3d
 from xcrack.analysis import plan as plans
 from xcrack.analysis.plan import forecast_of
 from xcrack.base import machine
@@ -129,6 +129,68 @@ def test_adapt_keeps_what_it_has_where_the_next_mesh_does_not_fit(monkeypatch):
     assert not adapted.met
     assert len(adapted.rounds) == 1
     assert "needs more memory than is free" in adapted.reason
+
+
+def plate():
+    """An edge crack and an inner one."""
+    lines = [[(-1.1, 0.031), (0.07, 0.012)], [(-0.41, -0.47), (0.33, -0.52)]]
+    pull = [xc.traction("top", (0.0, 1.0)), xc.traction("bottom", (0.0, -1.0))]
+    steel = xc.Isotropic(1.3, 0.27, plane="strain")
+    cracks = [xc.line_crack(line) for line in lines]
+    return xc.Problem(scenes_2d.perturbed(14, 5), steel, cracks, loads=pull)
+
+
+def test_plan_names_every_ingredient_before_anything_is_built(monkeypatch):
+    """One line an ingredient, without cutting or assembling; the report has the same and more."""
+    import xcrack.analysis.solve
+    import xcrack.fem.system
+
+    def forbidden(*args, **options):
+        raise AssertionError("plan built something")
+
+    scene = plate()
+    with monkeypatch.context() as patch:
+        for name in ("cut", "function_space", "bulk"):
+            patch.setattr(xcrack.fem.system, name, forbidden)
+        patch.setattr(xcrack.analysis.solve, "system", forbidden)
+        planned = xc.plan(scene)
+    *lines, last = str(planned).splitlines()
+    assert last.startswith("forecast")
+    assert len(lines) == len(planned.ingredients)
+    assert all(" used " in f" {line} " or "left out" in line for line in lines)
+    report = xc.solve(scene).report
+    names = [i.name for i in report.ingredients]
+    assert [i.name for i in planned.ingredients] == names[: len(planned.ingredients)]
+    assert {"load states", "standard functions", "mouths of crack 0"} <= set(names)
+    assert "mouths of crack 1" not in names
+    for row in report.ingredients:
+        assert len(row.reason) > 5
+    assert "1 factorisations" in str(report)
+
+
+def test_plan_in_space_builds_nothing(monkeypatch):
+    import xcrack.analysis.solve
+    import xcrack.fem.system
+
+    def forbidden(*args, **options):
+        raise AssertionError("plan built something")
+
+    scene = block(5, order=1)
+    with monkeypatch.context() as patch:
+        for name in ("cut", "function_space", "bulk"):
+            patch.setattr(xcrack.fem.system, name, forbidden)
+        for name in ("system", "iterative_system"):
+            patch.setattr(xcrack.analysis.solve, name, forbidden)
+        planned = xc.plan(scene)
+    assert planned["third mode"].used
+    report = xc.solve(scene).report
+    names = [i.name for i in report.ingredients]
+    planned_names = [i.name for i in planned.ingredients if i.name != "order 1"]  # plan's alone
+    assert planned_names == names[: len(planned_names)]
+    assert {"load states", "standard functions"} <= set(names)
+    assert all(len(row.reason) > 5 for row in report.ingredients)
+    iterative = xc.solve(replace(scene, numerics=xc.Numerics(linear="iterative"))).report
+    assert iterative["linear solver"].used
 
 
 # Peaks of processes: the resident set beyond what was there before the solve.
