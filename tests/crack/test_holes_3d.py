@@ -192,9 +192,13 @@ def test_small_holes_and_holes_at_an_angle(tmp_path, hole, section):
     assert area_inside(crack, mesh) - before == pytest.approx(gained, rel=0.01)
 
 
-@pytest.mark.parametrize("ligament", [0.015, *slow(0.004, 0.035)])
+@pytest.mark.parametrize("ligament", [0.015, *slow(0.004, 0.035, 0.1)])
 def test_a_front_passes_under_the_bottom_of_a_hole(tmp_path, ligament):
-    """Of .04 to .35 cells above it: one front, all of the area, and K has a value there."""
+    """Of .04 to 1 cells above it: one front, all of the area, and K has a value there.
+
+    Below half a cell the orders are 20 % apart, 6 to 17 % of the largest K off (cells of .03), and
+    a warning says so; at a cell they are within 4 %, and nothing is said.
+    """
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, 0.011 + ligament, 0, 0, 1, 0.14), facets=8)
     crack = place_surface(through_crack(-0.7), mesh)
     before = area_inside(crack, mesh)
@@ -207,7 +211,11 @@ def test_a_front_passes_under_the_bottom_of_a_hole(tmp_path, ligament):
             under = crack
     ends = [xc.displacement("top", (0.0, 0.0, 1e-3)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
     problem = xc.Problem(mesh, xc.Isotropic(210e3, 0.3), [under], supports=ends, order=1)
-    sif = xc.stress_intensity(xc.solve(problem))
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter("always")
+        sif = xc.stress_intensity(xc.solve(problem))
+    steep = [each for each in issued if "changes from cell to cell" in str(each.message)]
+    assert len(steep) == (ligament < 0.05)
     # Under the hole little is pulled, which is more just beside it.
     below, beside = (np.abs(sif.x[:, 1]) < 0.1), (np.abs(sif.x[:, 1]) > 0.34)
     far = sif.K_I[np.abs(sif.x[:, 1]) > 0.5].mean()
@@ -332,13 +340,18 @@ def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
     assert (join.step, join.cracks, join.N) == (joined, (0, 0), run.steps[joined].cycles)
     assert join.point == pytest.approx((-0.4 + 0.25, 0.0, 0.0), abs=0.2)
     split = counts.index(2)
+    # Killed after each step, and resumed for one more: byte for byte the same files.
     part = tmp_path / "part"
     shutil.copytree(tmp_path / "whole", part)
-    for path in sorted(part.glob("step_*.npz"))[split + 1 :]:
+    for path in sorted(part.glob("step_*.npz"))[1:]:
         path.unlink()
-    with pytest.warns(xc.XcrackWarning):
-        xc.resume(part, **given, keep_solutions=False)
-    for path in sorted((tmp_path / "whole").glob("step_*.npz")):
+    for stop in range(2, given["max_steps"] + 1):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", xc.XcrackWarning)
+            xc.resume(part, **given | {"max_steps": stop}, keep_solutions=False)
+    whole = sorted((tmp_path / "whole").glob("step_*.npz"))
+    assert len(whole) > split + 2
+    for path in whole:
         assert path.read_bytes() == (part / path.name).read_bytes()
 
 
