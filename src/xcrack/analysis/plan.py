@@ -424,7 +424,7 @@ def _order(problem: Problem) -> list[Ingredient]:
     if not depth_in_cells:
         return []
     depths = ", ".join(f"crack {c}: {value:.2g} cells deep" for c, value in depth_in_cells.items())
-    reason = f"{depths}; K is 1 to 5 % too low below {DEEP:g} cells, order=2 within 0.5 %"
+    reason = f"{depths}; K is 1 to 7 % too low below {DEEP:g} cells, order=2 within 0.5 %"
     return [Ingredient("order 1", True, reason)]
 
 

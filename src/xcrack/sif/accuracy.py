@@ -203,7 +203,7 @@ def warn_of_order(solution: Solution, crack: int) -> None:
     depth = cells_deep(x, np.concatenate(fronts), space.mesh)
     if depth < DEEP:
         is_arm = bool(space.cracks[crack].ends_on)
-        wrong, rest = ("up to 5 % off", "3 %") if is_arm else ("1 to 5 % too low", "0.5 %")
+        wrong, rest = ("up to 5 % off", "3 %") if is_arm else ("1 to 7 % too low", "0.5 %")
         warn(
             f"order 1: crack {crack} is {depth:.2g} cells deep, and K is {wrong} below "
             f"{DEEP:g}, which two domains do not show. Give order=2 (within {rest}), or cells that "

@@ -56,7 +56,7 @@ def stress_intensity(solution: Solution, crack: _CrackNumber = 0, error: _Bars =
         more than 1 % of K at a tip, or by 5 % of the largest K in the mean of a front; a contact
         zone at a tip or front that is shorter than two cells; faces that press at a kink which the
         cut rounds off; a front too short for K, or whose radius of curvature is below two cells; a
-        crack in 3D that is less than five cells of order 1 deep.
+        crack in 3D that is less than seven cells of order 1 deep.
     """
     if not isinstance(solution, Solution):
         hint = ""
