@@ -220,7 +220,7 @@ def test_a_front_passes_under_the_bottom_of_a_hole(tmp_path, ligament):
     below, beside = (np.abs(sif.x[:, 1]) < 0.1), (np.abs(sif.x[:, 1]) > 0.34)
     far = sif.K_I[np.abs(sif.x[:, 1]) > 0.5].mean()
     assert 0 < sif.K_I[below].min()
-    assert 0.2 * far < sif.K_I[below].mean() < 0.8 * far
+    assert 0.2 * far < sif.K_I[below].mean() < 0.85 * far
     assert sif.K_I[beside] == pytest.approx(far, rel=0.25)
 
 
