@@ -105,15 +105,14 @@ print(history)
 for join in history.joins:
     print(join)
 if not QUICK:
-    # Fronts that pass beside each other are joined within a cell of meeting, so that a join comes
-    # at another N on another mesh; the life of the crack that they become is less sensitive.
+    # K where the fronts come out of the body is 5 % lower with cells of .4 mm, and the rate 14 %.
     coarse = run(0.4)
     for one, other in zip(coarse.joins, history.joins, strict=True):
         print(f"with cells of .4 mm at N = {one.N:.0f}, {one.N / other.N - 1:+.1%}")
-        assert abs(one.N / other.N - 1) < 0.4
+        assert abs(one.N / other.N - 1) < 0.15
     one, other = coarse.steps[-1].cycles, history.steps[-1].cycles
     print(f"and the last step at N = {one:.0f}, {one / other - 1:+.1%}")
-    assert abs(one / other - 1) < 0.1
+    assert abs(one / other - 1) < 0.08
 
 
 # %% Length at the toe and depth of the crack, and K of the half ellipse with the same

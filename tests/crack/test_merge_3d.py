@@ -4,6 +4,8 @@ Tolerances: circles are polygons of 96 sides (1e-3 of an area); fillets start at
 up to a side farther out than a circle would touch it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -182,3 +184,26 @@ def test_two_straight_fronts_of_a_plate_vanish_together():
     both = place_surface(merged_crack(*pair, 0.3, 0.1), mesh)
     x = sorted(both.points[front][:, 0].mean() for front in both.fronts)
     assert x == pytest.approx([-2.05, 1.98], abs=1e-12)
+
+
+def test_the_gap_is_that_within_the_body():
+    """Discs that come closest outside: at the side of the body they are a chord apart.
+
+    Exact; the spacing of the points along the fronts is .05, of which eight lie on a side.
+    """
+    for side in (0.2, 0.6):
+        mesh = box((-3, side, -1), (3, 2, 1), (12, 4, 4))
+        gap = gap_between(*pennies(0.3), Body.of(mesh), 3.0)
+        assert gap.width == pytest.approx(0.3 + 2 * (A - np.sqrt(A**2 - side**2)), abs=0.02)
+        assert gap.faces
+
+
+def test_the_gap_closes_as_the_cracks_do():
+    """Widths while one crack moves by a sixtieth of a side: no jump (round-off of the placing)."""
+    mesh = box((-3, 0.35, -1), (3, 2, 1), (12, 4, 4))
+    one, other = pennies(0.3)
+    shift = np.linspace(0.0, 0.2, 21)
+    body = Body.of(mesh)
+    moved = [replace(other, points=other.points - [d, 0, 0]) for d in shift]
+    width = np.array([gap_between(one, crack, body, 3.0).width for crack in moved])
+    assert np.diff(width) == pytest.approx(-np.diff(shift), abs=1e-6)

@@ -13,7 +13,9 @@ import pytest
 import xcrack as xc
 from support.scenes_fronts import graded, lines
 from xcrack.growth import joins_3d
+from xcrack.growth.alarms import alarm_of_energy
 from xcrack.growth.gaps import amplification, part_of_time
+from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import numbers_after
 from xcrack.mesh.triangulation import face_areas
 from xcrack.view.report_results import growth
@@ -317,3 +319,24 @@ def fabrikant(gap, radial=20, around=64):
 def test_numbers_after_joins(n, pairs, left, numbers):
     joins = [xc.Join(1, 1.0, (0.0, 0.0, 0.0), pair) for pair in pairs]
     assert numbers_after(n, joins, left) == numbers
+
+
+def test_energy_that_K_does_not_explain_is_warned_of():
+    """As much energy as K says, a third of it, and loads that do work of their own."""
+    pull = [xc.traction("top", (0, 80.0)), xc.traction("bottom", (0, -80.0))]
+    mesh, steel = xc.box((0, -20), (20, 20), (20, 40)), xc.Isotropic(210e3, 0.3, plane="strain")
+    edge = xc.line_crack([(0, 0.3), (4, 0.3)])
+    body = xc.Problem(mesh, steel, [edge], loads=pull)
+    law, cycle = xc.paris(1e-13, 3.0), xc.Cycle(0.1, 1.0)
+    before, after = xc.grow(body, law, xc.max_hoop_stress, cycle, da=1.0, max_steps=2)
+    options = law, xc.max_hoop_stress, cycle, 1.0
+    rule = GrowthRule(body, *options)
+    assert alarm_of_energy(rule, before, after) is None
+    first, last = before.solutions[-1], after.solutions[-1]
+    less = replace(last, energy=first.energy + (last.energy - first.energy) / 3)
+    wrong = replace(after, solutions=(less,))
+    alarm = alarm_of_energy(rule, before, wrong)
+    assert alarm.value == pytest.approx(1 / 3, rel=0.05)
+    assert "from step 0 to 1: faces of the crack" in str(alarm)
+    pulled = replace(body, supports=[xc.displacement("top", (None, 0.1))])
+    assert alarm_of_energy(GrowthRule(pulled, *options), before, wrong) is None

@@ -211,19 +211,38 @@ def has_left(cracks):
     return any(front[0] != front[-1] for crack in cracks for front in crack.fronts or ())
 
 
+def growing_problem(seed, cells=GROWING_CELLS):
+    """A pair in a cube, alike pulled from all sides."""
+    mesh = xc.box((-1.25,) * 3, (1.25,) * 3, cells)
+    cracks, steel = pair_to_grow(seed), xc.Isotropic(E, NU)
+    return xc.Problem(mesh, steel, cracks, loads=LOADS, order=1, contact="off")
+
+
+def growth_of(problem, most_steps):
+    """Steps of a run, one by one."""
+    return xc.grow(
+        problem, xc.paris(C=1e-12, m=3.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=DA,
+        max_steps=most_steps, progress=False,
+    )  # fmt: skip
+
+
+def grown_steps(seed, cells, after_join):
+    """Steps up to some after the first join."""
+    steps = []
+    for step in growth_of(growing_problem(seed, cells), MOST_STEPS):
+        steps.append(step)
+        if any(each.joins for each in steps[: len(steps) - after_join + 1]):
+            break
+    return steps
+
+
 def growing_row(seed):
     """The row of a pair that grows until it has met and one step more, or comes out of the body."""
     begin = time.process_time()
-    cracks = pair_to_grow(seed)
-    mesh = xc.box((-1.25,) * 3, (1.25,) * 3, GROWING_CELLS)
-    problem = xc.Problem(mesh, xc.Isotropic(E, NU), cracks, loads=LOADS, order=1, contact="off")
     steps, met, ended = [], None, ""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        run = xc.grow(
-            problem, xc.paris(C=1e-12, m=3.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=DA,
-            max_steps=MOST_STEPS, progress=False,
-        )  # fmt: skip
+        run = growth_of(growing_problem(seed), MOST_STEPS)
         left = False
         while not left and (met is None or len(steps) == met):
             try:

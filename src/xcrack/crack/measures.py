@@ -93,7 +93,7 @@ _FINE = 0.25  # of a cell: sides of the pieces that the boundary of the body cli
 _MOST = 1000  # parts of a side of a front
 
 
-def area_inside(crack: Crack, mesh: Mesh) -> float:
+def area_inside(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
     """Area of the part of a 3D crack that lies in the body.
 
     Faces near the boundary are halved until their sides are a quarter of a cell, and what the
@@ -104,6 +104,8 @@ def area_inside(crack: Crack, mesh: Mesh) -> float:
     crack : Crack
         3D.
     mesh : Mesh
+    body : Body, optional
+        Of the mesh, where it is known, or what of it counts.
 
     Returns
     -------
@@ -115,10 +117,7 @@ def area_inside(crack: Crack, mesh: Mesh) -> float:
     ProblemError
         No part of the crack lies in the body.
     """
-    return _area_inside(crack, Body.of(mesh))
-
-
-def _area_inside(crack: Crack, body: Body) -> float:
+    body = body or Body.of(mesh)
     piece = crack.points[crack.faces]
     total = 0.0
     while len(piece):
@@ -198,7 +197,7 @@ def surface_size(crack: Crack, mesh: Mesh, body: Body | None = None) -> float:
         area where all fronts have left the body.
     """
     body = body or Body.of(mesh)
-    area, length = _area_inside(crack, body), _front_length_inside(crack, body)
+    area, length = area_inside(crack, mesh, body), _front_length_inside(crack, body)
     return area / length if length > 0 else float(np.sqrt(area))
 
 

@@ -23,6 +23,7 @@ from xcrack.mesh.triangulation import rim, unit
 
 _ANGLE = np.cos(np.radians(20.0))  # normals of both pieces of a front may differ by as much
 _TILT = np.cos(np.radians(45.0))  # and those of two cracks
+_BETWEEN = 8  # points of a side of a front, where the gap to another one is sought
 OFFSET = 0.5  # of a cell: both lie in one surface up to that, and beyond it a step leads across
 STEP = 2.05  # cells: the highest step; farther apart fronts pass each other
 _NEAR = 1.1  # cells between two fronts of a crack below which they join
@@ -78,33 +79,50 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
     best: FrontGap | None = None
     for a, b in ((one, other), (other, one)):
         low, high = b.points.min(axis=0) - reach, b.points.max(axis=0) + reach
-        tree: TriangleTree | None = None
-        for front in front_frames(a):
-            near_box = ((front.x >= low) & (front.x <= high)).all(axis=1)
-            if not near_box.any():
-                continue
-            tree = triangle_tree(b.points, b.faces) if tree is None else tree
-            x, normal = front.x[near_box], front.frame[near_box, 1]
-            nearest_point = closest_in(tree, x, reach)
-            rows = np.nonzero((nearest_point.triangle >= 0) & body.contains(x))[0]
-            if not len(rows):
-                continue
-            way = nearest_point.foot[rows] - x[rows]
-            normal_distance = np.einsum("ij,ij->i", way, normal[rows])
-            offset = np.linalg.norm(way - normal_distance[:, None] * normal[rows], axis=1)
-            k = int(np.argmin(offset))
-            row = rows[k]
-            if best is None or offset[k] < best.width:
-                turn = float(tree.normal[nearest_point.triangle[row]] @ normal[row])
-                faces = _is_on_front(b, nearest_point.foot[row], tree.distance_tolerance)
-                best = FrontGap(
-                    float(offset[k]),
-                    float(abs(normal_distance[k])),
-                    turn,
-                    x[row] + way[k] / 2,
-                    faces,
-                )
+        x, normal = _front_points(a, body, low, high)
+        if not len(x):
+            continue
+        tree = triangle_tree(b.points, b.faces)
+        nearest_point = closest_in(tree, x, reach)
+        rows = np.nonzero((nearest_point.triangle >= 0) & body.contains(nearest_point.foot))[0]
+        feet, other_normal = nearest_point.foot[rows], tree.normal[nearest_point.triangle[rows]]
+        y, normal_there = _front_points(b, body, -np.inf, np.inf)
+        if len(y):  # nearest where they come out of the body a foot would lie beyond it
+            distance, place = cKDTree(y).query(x)
+            near = np.nonzero(distance < reach)[0]
+            rows, feet = np.append(rows, near), np.concatenate([feet, y[place[near]]])
+            other_normal = np.concatenate([other_normal, normal_there[place[near]]])
+        if not len(rows):
+            continue
+        way = feet - x[rows]
+        normal_distance = np.einsum("ij,ij->i", way, normal[rows])
+        offset = np.linalg.norm(way - normal_distance[:, None] * normal[rows], axis=1)
+        k = int(np.argmin(offset))
+        if best is None or offset[k] < best.width:
+            best = FrontGap(
+                float(offset[k]),
+                float(abs(normal_distance[k])),
+                float(other_normal[k] @ normal[rows[k]]),
+                x[rows[k]] + way[k] / 2,
+                _is_on_front(b, feet[k], tree.distance_tolerance),
+            )
     return best
+
+
+def _front_points(
+    crack: Crack, body: Body, low: Floats | float, high: Floats | float
+) -> tuple[Floats, Floats]:
+    """Points close along the fronts of a crack, in a box and in a body, and normals `(n, 3)`."""
+    parts = [np.zeros((0, 6))]
+    for front in front_frames(crack):
+        number = np.arange(len(front.x) + front.closed)
+        t = np.linspace(0, number[-1], _BETWEEN * number[-1] + 1)
+        corners = np.hstack([front.x, front.frame[:, 1]])[number % len(front.x)]
+        parts.append(np.stack([np.interp(t, number, column) for column in corners.T], axis=1))
+    points, normals = np.split(np.concatenate(parts), 2, axis=1)
+    rows = np.nonzero(((points >= low) & (points <= high)).all(axis=1))[0]
+    rows = rows[body.contains(points[rows])]
+    return points[rows], unit(normals[rows])
 
 
 def _is_on_front(crack: Crack, x: Floats, tolerance: float) -> bool:

@@ -5,20 +5,28 @@ import numpy as np
 from xcrack.analysis.report import Alarm, alarms_of_solutions, has_units, millimetre
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import arguments_of
+from xcrack.base.arrays import Floats
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import STRESS
+from xcrack.crack.junctions_3d import body_of
+from xcrack.crack.measures import area_inside, length_inside
 from xcrack.fatigue.checks import evaluate_law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import PLACE
 from xcrack.growth.step import Step, place_name
 from xcrack.growth.validity import Validity, validity
+from xcrack.mesh.locate import Body
 from xcrack.model.loads import Load
+from xcrack.sif.stress_intensity import energy_release_rate
 
 _FAST = 0.02  # of the crack in a cycle
 _FAR = 0.1  # mm in a cycle
 _ENDLESS = 1e12  # cycles until a crack has grown by its size
 _FEW = 10.0  # cycles of a life
+_LEAST_GROWTH = 0.1  # of the area: less is within what energy differs by between two meshes
+_BALANCED = 0.6  # of G times area; .9 to 1.05 where all is well, down to .7 at joins
+_DEAD = frozenset({"traction", "volume", "point_force", "face_pressure"})
 _SCALED = 20.0  # factor of a spectrum
 _STRESS = 5.0  # load that is a stress already, and not a unit load
 _BELOW = 3.0  # times the range: a law that gives no growth there either
@@ -79,6 +87,72 @@ def alarm_of_life(rule: GrowthRule, last: Step, end: str) -> Alarm | None:
         return None
     remedy = "is the law in the units of the model, and are the loads as meant?"
     return Alarm("the number of cycles until the run ended", cycles, _FEW, "", remedy)
+
+
+def alarm_of_energy(rule: GrowthRule, last: Step, step: Step) -> Alarm | None:
+    """A step whose solution does not release the energy that K says: two ways to one number.
+
+    Asked where loads are dead, so that the strain energy grows by G times the new area, where there
+    is no friction, and where the cracks have grown by a tenth. More is released where a ligament
+    breaks; fronts that are led on to each other at once come down to .7.
+    """
+    if not (_has_dead_loads(rule) and last.solutions and step.solutions and step.sif):
+        return None
+    old_area, area = (_areas(each) for each in (last, step))
+    if area.sum() < (1 + _LEAST_GROWTH) * old_area.sum():
+        return None
+    old_G, G = _release(last, old_area), _release(step, area)
+    if old_G is None or G is None:
+        return None
+    if len(area) != len(old_area):  # some have become one
+        old_G, G = (np.array([g @ part / part.sum()]) for g, part in ((old_G, old_area), (G, area)))
+        area, old_area = area.sum(keepdims=True), old_area.sum(keepdims=True)
+    by_K = float((old_G + G) @ (area - old_area)) / 2
+    ratio = (step.solutions[-1].energy - last.solutions[-1].energy) / by_K if by_K > 0 else 1.0
+    if ratio >= _BALANCED:
+        return None
+    return Alarm(
+        "the energy that the step releases over G times the new area", ratio, _BALANCED,
+        f"from step {last.index} to {step.index}", "faces of the crack lie over each other, or the "
+        "cells are too coarse where fronts turn or meet: look at the faces with plot, and take "
+        "shorter steps in smaller cells.",
+    )  # fmt: skip
+
+
+def _has_dead_loads(rule: GrowthRule) -> bool:
+    """Whether loads are forces that do not change, and nothing else takes or gives energy."""
+    problem = rule.problem
+    states = [state for state in rule.cycle.load_states if isinstance(state, list | tuple)]
+    loads = [*problem.loads, *(load for state in states for load in state)]
+    is_changing = rule.load_program is not None or rule.response is not None
+    return (
+        not is_changing
+        and all(load.acts <= _DEAD for load in loads)
+        and all(support.holds for support in problem.supports)
+        and not any(problem.frictions)
+    )
+
+
+def _areas(step: Step) -> Floats:
+    """Of the cracks of a step within the body, before those on which they end; lengths in 2D."""
+    mesh = step.solutions[-1].problem.mesh
+    if mesh.dim == 2:
+        return np.array([length_inside(crack, mesh) for crack in step.cracks])
+    body = Body.of(mesh)
+    parts = (body_of(step.cracks, c, body) for c in range(len(step.cracks)))
+    pairs = zip(step.cracks, parts, strict=True)
+    return np.array([area_inside(crack, mesh, part) for crack, part in pairs])
+
+
+def _release(step: Step, area: Floats) -> Floats | None:
+    """Mean of G over the growth of each crack `(c,)`; None where a material does not say it."""
+    result = np.zeros(len(area))
+    for c, (sif, rate) in enumerate(zip(step.sif[-1], step.rate, strict=True)):
+        if sif.E_prime is None or sif.nu is None or not np.isfinite(rate).all():
+            return None
+        if rate.any():
+            result[c] = np.average(energy_release_rate(sif), weights=rate)
+    return result
 
 
 def _factors(rule: GrowthRule) -> list[Alarm]:
@@ -183,4 +257,4 @@ def _no_growth(rule: GrowthRule, step: Step, units: str) -> list[Alarm]:
     return [Alarm(quantity, float(factor * largest), largest, "", words)]
 
 
-__all__ = ["alarm_of_life", "alarms_of_step", "validity_of"]
+__all__ = ["alarm_of_energy", "alarm_of_life", "alarms_of_step", "validity_of"]

@@ -13,6 +13,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.junctions_3d import (
     FaceAhead,
+    body_of,
     crossings,
     face_ahead,
     face_led_on,
@@ -23,7 +24,7 @@ from xcrack.crack.junctions_3d import (
     renumbered_arms,
     with_room,
 )
-from xcrack.crack.measures import crack_size
+from xcrack.crack.measures import area_inside, crack_size
 from xcrack.crack.merging import (
     OFFSET,
     STEP,
@@ -143,7 +144,19 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     if not joined_now.places:
         return plan
     way, time, time_at_first_rate = part * way, part * time, part * time_at_first_rate
-    cycles = time * plan.cycles / _gain(step, joined_now.apart, rule.problem.mesh, m)
+    gain = _gain(step, joined_now.apart, rule.problem.mesh, m)
+    if pairs_beside:
+        # Fronts that are led on to each other make area at once. It takes as long as fronts take
+        # for as much: else on coarse cells, which lead them farther, it would cost nothing.
+        area, area_apart, area_joined = (
+            sum(area_inside(c, body.mesh, body_of(cracks, k, body)) for k, c in enumerate(cracks))
+            for cracks in (step.corrected, joined_now.apart, joined_now.cracks)
+        )
+        way_of_area = way * (area_joined - area) / max(area_apart - area, 1e-3 * area)
+        time *= max(1.0, way_of_area / time_at_first_rate)
+        time_at_first_rate = max(time_at_first_rate, way_of_area)
+        gain = max(gain, _gain_of(area_joined / area, m))
+    cycles = time * plan.cycles / gain
     cycle_error = UNKNOWN[3] * abs(time_at_first_rate * plan.cycles - cycles)
     joins_of_step = [
         Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), pair)
@@ -280,9 +293,7 @@ def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] |
             way = float(plan.arc[rows].mean()) if rows.any() else 0.0
             cell = float(body.cell_size(front.x).mean())
             if radius - way < _LIGAMENT * cell and way > 0:
-                # K of a round ligament goes with one over the root of its radius (a flat punch).
-                part = 1 / (1 + solves_of(step)[1].exponent / 2)
-                return c, f, min(part * radius / way, max(1.0, cell / plan.largest))
+                return c, f, min(radius / way, max(1.0, cell / plan.largest))
     return None
 
 
@@ -498,46 +509,44 @@ def _met_face(
     Of fronts beside each other one is led on, and the other meets its face.
     """
 
-    def face_after(share: float, reach: float) -> FaceAhead | None:
+    def face_after(share: float) -> FaceAhead | None:
         cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
         if _cross(cracks_now, i, k, body):
             return FaceAhead(i, k, 0.0, 1.0, np.zeros(3))
+        both = ((i, k), (k, i))
         if is_beside:
-            faces_ahead = (_face_beside(cracks_now, *pair, body) for pair in ((i, k), (k, i)))
-            nearest = min(filter(None, faces_ahead), key=lambda each: each[0], default=None)
+            faces_beside = (_face_beside(cracks_now, *pair, body) for pair in both)
+            nearest = min(filter(None, faces_beside), key=lambda each: each[0], default=None)
             return None if nearest is None else nearest[1]
-        both = [face_ahead(cracks_now, *pair, body, reach) for pair in ((i, k), (k, i))]
-        return min(
-            (one for one in both if one is not None), key=lambda one: one.width, default=None
-        )
+        faces_ahead = (face_ahead(cracks_now, *pair, body, _AHEAD) for pair in both)
+        return min(filter(None, faces_ahead), key=lambda one: one.width, default=None)
 
-    low, high, face_met = 0.0, 1.0, face_after(1.0, _AHEAD)
-    while (
-        face_met is not None
-        and face_met.width > _LEFT * face_met.leg
-        and high * plan.largest < face_met.leg
-    ):
+    def is_near(face: FaceAhead, share: float = 1.0) -> bool:
+        return face.width <= share * _LEFT * face.leg
+
+    low, high, face_met = 0.0, 1.0, face_after(1.0)
+    while face_met is not None and not is_near(face_met) and high * plan.largest < face_met.leg:
         low, high = high, high + face_met.leg / plan.largest
-        face_met = face_after(high, _AHEAD)
+        face_met = face_after(high)
     way = high
-    if face_met is not None and face_met.width <= _LEFT * face_met.leg:
+    if face_met is not None and is_near(face_met):
         for _ in range(_TRIES):
             way = 0.5 * (low + high)
-            face_near = face_after(way, _AHEAD)
-            if face_near is not None and face_near.width <= 0.5 * _LEFT * face_near.leg:
+            face_met = face_after(way)
+            if face_met is not None and is_near(face_met, 0.5):
                 high = way
-            elif face_near is None or face_near.width > _LEFT * face_near.leg:
+            elif face_met is None or not is_near(face_met):
                 low = way
             else:
                 break
         else:
             way = low
-    last = face_after(way, _AHEAD)
-    rest = 0.0 if last is None else last.width / plan.largest
-    whole_way = way + rest
-    c = i if last is None else last.crack
+            face_met = face_after(way)
+    if face_met is None:
+        return way, way, way
+    whole_way = way + face_met.width / plan.largest
     gap = whole_way * plan.largest
-    return whole_way * part_of_time(gap / step.sizes[c], exponent, 3), way, whole_way
+    return whole_way * part_of_time(gap / step.sizes[face_met.crack], exponent, 3), way, whole_way
 
 
 def _close_pairs(
@@ -604,9 +613,6 @@ def _shares_at_meeting(
     gap, gap_left = (0.0 if first is None else first.width), share_left * size
     if gap <= gap_left:
         return way, way, way
-    # What is left over a step breaks at once: its cycles would be those of fronts that pass.
-    gap_beyond = gap_left - _LEFT * size
-    gap, gap_left = gap - gap_beyond, gap_left - gap_beyond
     a = 2 * float(np.mean([step.sizes[c] for c in pair]))  # of a penny: its radius
     way_of_gap = way * gap / (gap - gap_left)
     time = way_of_gap * part_of_time(gap / a, exponent, 3)
@@ -619,11 +625,13 @@ def _gain(step: Step, cracks_now: Sequence[Crack], mesh: Mesh, exponent: float) 
 
     As in `elapsed_3d`: K goes with the root of the size.
     """
-    gains = []
-    for c, old_size in enumerate(step.sizes):
-        x = np.log(crack_size(cracks_now, c, mesh) / old_size)
-        gains.append(float(exprel(x) / exprel(x - exponent / 2 * x)))
-    return max(gains)
+    sizes = zip(step.sizes, (crack_size(cracks_now, c, mesh) for c in range(len(step.sizes))))
+    return max(_gain_of((size / old_size) ** 2, exponent) for old_size, size in sizes)
+
+
+def _gain_of(area_ratio: float, exponent: float) -> float:
+    x = 0.5 * np.log(area_ratio)
+    return float(exprel(x) / exprel(x - exponent / 2 * x))
 
 
 def _share(

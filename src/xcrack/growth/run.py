@@ -17,7 +17,7 @@ from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law, LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import joins_3d
-from xcrack.growth.alarms import alarm_of_life, alarms_of_step, validity_of
+from xcrack.growth.alarms import alarm_of_energy, alarm_of_life, alarms_of_step, validity_of
 from xcrack.growth.cells import at_step, bars_are_foretold, begin, follow, plan_again
 from xcrack.growth.ends import (
     beyond_end,
@@ -277,8 +277,8 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                     break
                 is_torn = is_torn or _warn_of_mode_III(next_rule, next_step)
                 count = len(messages)
-                again = next_rule.estimates
-                other = plan_again(first_rule, next_rule, cut, next_step) if again else None
+                estimates = next_rule.estimates
+                other = plan_again(first_rule, next_rule, cut, next_step) if estimates else None
                 if other is not None:
                     del messages[:count]  # of a step that is not handed over
                 else:
@@ -288,6 +288,8 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                         next_rule, cut, (next_step, reuse, end), messages
                     )
                     next_step = _with_validity(next_rule, next_step)
+                    if alarm := alarm_of_energy(next_rule, cut, next_step):
+                        warn(str(alarm))
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
                 rule, last = other[0], _with_plan(other[0], other[1] or last)

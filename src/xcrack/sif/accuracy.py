@@ -203,9 +203,9 @@ def warn_of_order(solution: Solution, crack: int) -> None:
     depth = cells_deep(x, np.concatenate(fronts), space.mesh)
     if depth < DEEP:
         is_arm = bool(space.cracks[crack].ends_on)
-        wrong, rest = ("up to 5 % off", "3 %") if is_arm else ("1 to 7 % too low", "0.5 %")
+        error, rest = ("up to 5 % off", "3 %") if is_arm else ("1 to 7 % too low", "0.5 %")
         warn(
-            f"order 1: crack {crack} is {depth:.2g} cells deep, and K is {wrong} below "
+            f"order 1: crack {crack} is {depth:.2g} cells deep, and K is {error} below "
             f"{DEEP:g}, which two domains do not show. Give order=2 (within {rest}), or cells that "
             f"are {DEEP / max(depth, 1e-3):.2g} times smaller as far as the crack is deep."
         )
