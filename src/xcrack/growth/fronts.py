@@ -418,8 +418,7 @@ def _waves(
 
 def ends_of(step: Step, plan: Plan) -> Floats:
     """Where the fronts at the stations come to `(n, 3)`."""
-    stations = solves_of(step)[0]
-    return stations.x + plan.move
+    return solves_of(step)[0].x + plan.move
 
 
 def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:

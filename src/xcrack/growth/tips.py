@@ -17,7 +17,6 @@ from xcrack.crack.measures import exit_ahead
 from xcrack.crack.meetings import (
     AHEAD,
     LEAST,
-    Faces,
     Meeting,
     joined,
     last_faces,
@@ -626,7 +625,9 @@ def _corrected_points(
     angle = solves.angles(frame)
     solved_angle = np.array(angle[-1])
     gamma = np.where(plan.moves, turn_of_faces(rates, faces.length), 0.0)
-    begin_of_face = _begins_of_faces(last, plan)
+    old_faces = last_faces(last.corrected)
+    is_replaced = moved_on(old_faces, stations.fresh, plan.cell)
+    begin_of_face = np.where(is_replaced[:, None], old_faces.anchor, old_faces.tip)
     growth = Growth(plan.move, plan.arc, plan.cycles)
     for _ in range(_PASSES):
         growth = stretch.growth(frame, angle)
@@ -883,13 +884,6 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
         prolonged_error, error_before = _RATIO_OF_PROLONGED * abs(then - new), abs(then - line)
         error_now += min(prolonged_error, _RATIO_OF_FIRST * share * error_before)
     return _CyclesError(newest_error, error_now, newest_error)
-
-
-def _begins_of_faces(last: Step, plan: Plan) -> Floats:
-    """Where the last faces of the predicted cracks begin `(n, 2)`."""
-    faces: Faces = last_faces(last.corrected)
-    is_replaced = moved_on(faces, solves_of(last)[0].fresh, plan.cell)
-    return np.where(is_replaced[:, None], faces.anchor, faces.tip)
 
 
 def _rows_that_stay(ends: Floats, placed_cracks: Sequence[Crack]) -> Ints:
