@@ -14,7 +14,7 @@ import numpy as np
 from xcrack.adaptivity.indicators import Indicators, indicators_of
 from xcrack.adaptivity.resolved import resolved_problem
 from xcrack.adaptivity.sizes_2d import cell_ratios, tip_sizes
-from xcrack.adaptivity.sizes_3d import first_mesh
+from xcrack.adaptivity.sizes_3d import coarse_mesh
 from xcrack.base.errors import (
     GeometryError,
     ProblemError,
@@ -54,14 +54,14 @@ _LARGER = 1.25  # cells at an end over the size wanted there, from which on the 
 def begin(rule: GrowthRule) -> GrowthRule:
     """A run on the mesh that it begins with: as given, where error bars can be had on it.
 
-    Else it is finer at tips and fronts.
+    Else it is finer at tips and fronts, along these by what the tolerance lets.
 
     Raises
     ------
     ProblemError
         That has more unknowns than the run may have.
     """
-    mesh = _MESHES[rule.problem.mesh.dim].first_mesh(rule.problem)
+    mesh = _MESHES[rule.problem.mesh.dim].first_mesh(rule.problem, rule.tolerance or 0.0)
     least_unknowns = mesh.dim * (mesh.n_points + len(mesh.edges))
     if rule.max_unknowns is not None and least_unknowns > rule.max_unknowns:
         raise ProblemError(
@@ -112,7 +112,7 @@ def follow(first_rule: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
     return _with_cells(first_rule, cells.with_ends(x, size), rule.meshes)
 
 
-def _first_mesh_2d(problem: Problem) -> Mesh:
+def _first_mesh_2d(problem: Problem, _: float) -> Mesh:
     """The mesh as it was given, where cracks are long enough in it; else finer at the tips."""
     problem = resolved_problem(problem)
     place, size = tip_sizes(problem)
@@ -258,7 +258,7 @@ def _cells_3d(cells: CellSizes | None, indicators: Indicators, target: float) ->
 class _Dimension:
     """What is another thing in 2D and in 3D."""
 
-    first_mesh: Callable[[Problem], Mesh]
+    first_mesh: Callable[[Problem, float], Mesh]
     error: Callable[[Indicators], float]
     cells: Callable[[CellSizes | None, Indicators, float], CellSizes]
     rounds: int
@@ -266,7 +266,7 @@ class _Dimension:
 
 _MESHES = {
     2: _Dimension(_first_mesh_2d, _error_2d, _cells_2d, 6),
-    3: _Dimension(first_mesh, _error_3d, _cells_3d, 3),
+    3: _Dimension(coarse_mesh, _error_3d, _cells_3d, 3),
 }
 
 # When a step asks for a finer mesh than it was computed on, and is computed again on that.
