@@ -206,6 +206,27 @@ def test_the_inner_front_of_an_annulus_closes():
     assert last.K_I.mean() == pytest.approx(K, rel=0.05)
 
 
+def test_cycles_of_a_ligament_inside_a_crack():
+    """In the step that breaks it, against steps a third as long: within 30 %, and late.
+
+    K of a round ligament goes with one over the root of its radius; what is left is that the
+    outer front grows meanwhile. At the rate of the beginning it would be 2.5 times as long.
+    """
+    whole, part = (
+        xc.collect(grow(scene_of(arc_crack(0.24, 0.72, 0.0), 20), da=da, max_steps=steps))
+        for da, steps in ((0.07, 2), (0.025, 5))
+    )
+    (join,) = whole.joins
+    assert join.step == 1
+    areas, cycles = (
+        np.array([f(step) for step in part.steps])
+        for f in (lambda step: meeting_energy.areas(step).sum(), lambda step: step.cycles)
+    )
+    finer = np.interp(meeting_energy.areas(whole.steps[1]).sum(), areas, cycles)
+    print(f"\n{join.N:.0f} for {finer:.0f}")
+    assert finer < join.N < 1.3 * finer
+
+
 def test_the_ends_of_an_arc_meet():
     """A C becomes an annulus, and that a disc."""
     history = xc.collect(grow(scene_of(arc_crack(0.33, 0.57, 0.35), 18), da=0.08, max_steps=5))

@@ -293,7 +293,9 @@ def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] |
             way = float(plan.arc[rows].mean()) if rows.any() else 0.0
             cell = float(body.cell_size(front.x).mean())
             if radius - way < _LIGAMENT * cell and way > 0:
-                return c, f, min(radius / way, max(1.0, cell / plan.largest))
+                # K of a round ligament goes with one over the root of its radius (a flat punch).
+                part = 1 / (1 + solves_of(step)[1].exponent / 2)
+                return c, f, min(part * radius / way, max(1.0, cell / plan.largest))
     return None
 
 
