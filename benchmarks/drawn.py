@@ -328,7 +328,8 @@ fewer that are ten times too wide are not to be expected.
 
 Pairs of pennies and ellipses at any offset and angle in a pulled cube, at order 1, ten cells
 across (`tests/support/drawn_pairs.py`). Of two that cross one runs through and the other is two
-arms; where one is cut by the front of the other the two are interlocked, which is refused. Where
+arms; where one is cut by the front of the other the two are interlocked, which is refused: one is
+then let reach beyond the other, as the message says. Where
 a message asks for a finer mesh at a place, or to leave an arm out, that is done, down to cells of
 .06. Growing pairs begin apart and go on for a step after they have met; what of the energy of a
 step the release over the new area does not explain is a share of all of it.
