@@ -432,6 +432,15 @@ def test_extension_reaches_ahead_of_every_front(cube):
     assert (surface.triangles[surface.label == 0] == placed.faces).all()
 
 
+def test_strips_are_crossed_where_they_are_not_flat(cube):
+    """Two triangles a field ahead of a plane crack, four where rays from a bent one turn."""
+    disc = penny_crack((0, 0, 0.03), (0, 0, 1), 0.5)
+    bent = xc.surface_crack(disc.points + np.outer(disc.points[:, 0] ** 2, (0, 0, 0.3)), disc.faces)
+    both = [extended_surface(place_surface(crack, cube), cube, 0.25) for crack in (disc, bent)]
+    flat_strip, twisted_strip = ((surface.label == 1).sum() for surface in both)
+    assert twisted_strip == pytest.approx(2 * flat_strip, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("crack", "message"),
     [

@@ -463,9 +463,8 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
         The surface and its prolongation.
     """
     shift = np.zeros(mesh.n_points)
-    values = phi[mesh.cells]
-    cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0) & ~at_end[mesh.cells].any(axis=1)
-    cells = np.nonzero(cut)[0]
+    low, high = _bounds(mesh, phi)
+    cells = np.nonzero((low < 0) & (high > 0) & ~_bounds(mesh, at_end)[1])[0]
     height = (tree.corners - tree.corners[0, 0]) @ tree.normal[0]
     if np.ptp(height) < _STRAIGHT * mesh.cell_size[cells].min(initial=np.inf):
         return shift  # a plane: phi is linear
@@ -473,7 +472,7 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
     x = np.einsum("pv,cvd->cpd", bary, mesh.points[mesh.cells[cells]]).reshape(-1, 3)
     distances = signed_in(tree, x)
     distance, _, is_beyond = (a.reshape(len(cells), len(weight)) for a in distances)
-    error = distance - values[cells] @ bary.T
+    error = distance - phi[mesh.cells[cells]] @ bary.T
     size = mesh.cell_size[cells]
     of_crack = (np.abs(error).max(axis=1) < _NO_CUT * size) & ~is_beyond.any(axis=1)
     cells, error, size = cells[of_crack], error[of_crack], size[of_crack]
@@ -490,6 +489,12 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
             1.25 * np.bincount(nodes.ravel(), load - product.ravel(), mesh.n_points) / nodal_volume
         )
     return shift
+
+
+def _bounds(mesh: Mesh, values: Floats | Bools) -> tuple[Floats, Floats]:
+    """Smallest and largest value at the corners of each cell; along rows of four is slow."""
+    corners = np.ascontiguousarray(values[mesh.cells].T)
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _chords(mesh: Mesh, phi: Floats, psi: Floats, cells: Ints) -> tuple[Floats, Floats]:
@@ -527,8 +532,8 @@ def _foot(front: Front, segment: Ints, position: Floats) -> tuple[Floats, Floats
 
 def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints:
     """Cells whose closed set meets phi = psi = 0."""
-    values = phi[mesh.cells]
-    rows = np.nonzero((values.min(axis=1) <= 0) & (values.max(axis=1) >= 0))[0]
+    low, high = _bounds(mesh, phi)
+    rows = np.nonzero((low <= 0) & (high >= 0))[0]
     edge = mesh.cell_to_edge[rows]
     a, b = mesh.edges[edge, 0], mesh.edges[edge, 1]
     is_crossed = phi[a] * phi[b] < 0

@@ -4,6 +4,8 @@ import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints
 
+_TWIST = 1e-9  # offset of diagonals over their length, below which a quadrilateral is flat
+
 
 def unit(vector: Floats) -> Floats:
     """Vectors `(..., d)` divided by their length."""
@@ -120,8 +122,8 @@ def ruled_strip(
     is_closed : bool
         Whether the last ray is joined with the first.
     is_crossed : bool
-        Whether quadrilaterals are divided by both diagonals: one alone would make a twisted strip
-        depend on its direction.
+        Whether quadrilaterals that are twisted or turn over are divided by both diagonals: one
+        alone would make the strip depend on its direction.
 
     Returns
     -------
@@ -141,11 +143,11 @@ def ruled_strip(
     a, b, c, d = (each.ravel() for each in corners)
     points, middles = points.reshape(-1, 3), np.zeros((0, 3), dtype=np.int64)
     if is_crossed:
-        is_quad = (a != b) & (c != d)
-        quads = np.stack([a, b, c, d], axis=1)[is_quad]
-        a, b, c, d = (each[~is_quad] for each in (a, b, c, d))
         x = np.zeros((n_points + len(points), 3))
         x[base], x[n_points:] = origin, points
+        is_quad = (a != b) & (c != d) & ~_is_flat(x[a], x[b], x[c], x[d])
+        quads = np.stack([a, b, c, d], axis=1)[is_quad]
+        a, b, c, d = (each[~is_quad] for each in (a, b, c, d))
         middle = n_points + len(points) + np.arange(len(quads))
         sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2)
         middles = np.concatenate(
@@ -156,6 +158,15 @@ def ruled_strip(
     faces = np.concatenate([faces.reshape(-1, 3), middles])
     is_proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return points, faces[is_proper]
+
+
+def _is_flat(a: Floats, b: Floats, c: Floats, d: Floats) -> Bools:
+    """Whether either diagonal divides a quadrilateral into the same area: convex, without twist."""
+    normal = np.cross(c - a, d - b)
+    twist = np.abs(np.einsum("ij,ij->i", b - a, normal))
+    halves = [np.cross(q - p, r - p) for p, q, r in ((a, b, c), (a, c, d), (a, b, d), (b, c, d))]
+    is_convex = np.all([np.einsum("ij,ij->i", half, normal) > 0 for half in halves], axis=0)
+    return np.asarray(is_convex & (twist <= _TWIST * np.linalg.norm(normal, axis=1) ** 1.5))
 
 
 def split_sides(points: Floats, faces: Ints, is_marked: Bools) -> tuple[Floats, Ints]:
