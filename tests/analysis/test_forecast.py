@@ -120,6 +120,22 @@ def test_a_solver_of_the_user_is_not_foretold(monkeypatch):
     assert xc.solve(block(4, "edge", 1), solver=lambda A: splu(A.tocsc()).solve).n_dof > 0
 
 
+@pytest.mark.slow
+def test_adapt_from_larger_cells_is_a_remedy_that_works(monkeypatch):
+    """It refines what it is given: the mesh that does not fit is no beginning for it."""
+    penny = xc.penny_crack((0.01, 0.02, 0.03), (0, 0, 1), 0.5)
+    fine, coarse = (
+        xc.Problem(xc.box((-1,) * 3, (1,) * 3, n), BODY, [penny], loads=PULL, contact="off")
+        for n in (14, 5)
+    )
+    monkeypatch.setattr(plans, "free_memory", lambda: 0.25e9)
+    for refused in (xc.solve, lambda scene: xc.adapt(scene, 0.1, progress=False)):
+        with pytest.raises(SizeError, match=r"larger cells to xc\.adapt"):
+            refused(fine)
+    adapted = xc.adapt(coarse, 0.1, progress=False)
+    assert adapted.met, adapted.reason
+
+
 @pytest.mark.slow  # a mesh of adapt is a real one: 50 k unknowns
 def test_adapt_keeps_what_it_has_where_the_next_mesh_does_not_fit(monkeypatch):
     mesh = xc.box((-1,) * 3, (1,) * 3, 4)

@@ -456,6 +456,74 @@ def test_cracks_that_no_mesh_takes(crack, message, cube):
         place_surface(crack, cube)
 
 
+def sheet(profile, n=8):
+    """A surface ruled along y over a profile of x and z `(k, 2)`."""
+    y = np.linspace(-0.45, 0.45, n)
+    x = np.array([(a, b, c) for a, c in profile for b in y])
+    k = np.arange(len(x)).reshape(-1, n)
+    a, b, c, d = (part.ravel() for part in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
+    return surface_crack(x, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
+
+
+def hairpin(gap):
+    """A sheet that turns back, with a gap between its parts."""
+    t = np.linspace(-np.pi / 2, np.pi / 2, 10)
+    turn = [0.3, gap / 2] + gap / 2 * np.column_stack([np.cos(t), np.sin(t)])
+    x = np.linspace(-0.5, 0.3, 9)[:-1]
+    ways = np.column_stack([x, 0 * x]), np.column_stack([x[::-1], 0 * x + gap])
+    return sheet(np.array((0.01, 0.02)) + np.concatenate([ways[0], turn, ways[1]]))
+
+
+def folded(degrees):
+    t, angle = np.linspace(0, 0.5, 6)[:, None], np.radians(degrees)
+    ways = t[::-1] * [1, 0], t[1:] * [np.cos(angle), np.sin(angle)]
+    return sheet(np.array((-0.2, 0.03)) + np.concatenate(ways))
+
+
+def loop_of_rope():
+    """A sheet that runs across itself."""
+    t = np.linspace(-0.5, 2 * np.pi - 0.7, 40)
+    return sheet(np.column_stack([0.5 * np.sin(t), 0.35 * np.sin(2 * t)]) + 0.017)
+
+
+def pieces(*cracks):
+    first = np.cumsum([0, *(len(crack.points) for crack in cracks)])
+    faces = [crack.faces + n for crack, n in zip(cracks, first, strict=False)]
+    return surface_crack(np.concatenate([crack.points for crack in cracks]), np.concatenate(faces))
+
+
+DISC = penny_crack((0, 0, 0.03), (0, 0, 1), 0.8, n=48)
+ACROSS = penny_crack((0.05, 0, 0.05), (1, 0, 0.3), 0.5, n=24)
+BESIDE = penny_crack((0.1, 0, 0.03), (0, 0, 1), 0.8, n=48)
+
+
+@pytest.mark.parametrize(
+    ("crack", "message"),
+    [
+        (hairpin(0.1), "0.1 apart, less than half a cell .*refine the mesh between"),
+        (folded(5), "apart, less than half a cell .*open it to 40 degrees"),
+        (folded(20), "apart, less than half a cell .*open it to 40 degrees"),
+        (loop_of_rope(), "crosses itself near.*arm"),
+        (pieces(DISC, ACROSS), "pieces of the surface crack meet near.*cracks of their own"),
+        (pieces(DISC, BESIDE), "pieces of the surface crack meet near.*leave out what lies"),
+    ],
+    ids=["hairpin", "fold of 5", "fold of 20", "loop", "crossing", "on each other"],
+)
+def test_surfaces_that_meet_themselves(crack, message):
+    with pytest.raises(GeometryError, match=message):
+        place_surface(crack, xc.box((-1,) * 3, (1,) * 3, 8))
+
+
+def test_remedies_for_surfaces_that_meet_themselves():
+    """What the refusals say is done, and the crack is taken."""
+    coarse, fine = (xc.box((-1,) * 3, (1,) * 3, n) for n in (8, 20))
+    assert len(place_surface(hairpin(0.1), fine).fronts) == 1
+    assert len(place_surface(folded(40), coarse).fronts) == 1
+    arms = [xc.arm(ACROSS, on=0, side=side) for side in (1, -1)]
+    scene = xc.Problem(coarse, xc.Isotropic(1.0, 0.3), cracks=[DISC, *arms])
+    assert all(crack.fronts for crack in scene.placed)
+
+
 def test_plane_and_space_do_not_mix(cube):
     with pytest.raises(GeometryError, match="3D crack"):
         place_crack(penny_crack((0, 0, 0), (0, 0, 1), 0.5), xc.box((0, 0), (1, 1), 4))

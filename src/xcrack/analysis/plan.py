@@ -117,7 +117,10 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
     forecast = forecast_of(problem, n_states)
     if forecast.fits:
         return
-    remedy_list = ["larger cells away from the cracks", "or let xc.adapt choose the mesh"]
+    remedy_list = [
+        "larger cells away from the cracks",
+        "or a mesh of larger cells to xc.adapt, which makes them smaller only where K asks for it",
+    ]
     if not forecast.by_iteration and problem.mesh.dim == 3:
         remedy_list.insert(0, 'Numerics(linear="iterative")')
     if forecast.order == 2:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
@@ -28,7 +29,7 @@ from xcrack.crack.junctions_3d import (
     may_touch,
 )
 from xcrack.crack.merging import joined_fronts
-from xcrack.mesh.distances import closest_in, signed_in, triangle_tree
+from xcrack.mesh.distances import closest_in, first_crossing, signed_in, triangle_tree
 from xcrack.mesh.locate import Body, locate
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import cross, is_within
@@ -229,6 +230,14 @@ _NEAR = 3.0  # cells around the body in which the outline is refined
 _BEFORE_FRONT = 0.5  # of a cell: an arm ends no closer to the front of the crack on which it ends
 _FLUSH = np.cos(np.radians(5.0))  # between normals of cracks that lie on each other
 _TOUCH = 1e-6  # share of a cell within which cracks touch
+_OPPOSITE = 0.5  # of a cell: parts of one surface that face each other within it lie in one cell
+_ALONG = 0.75  # of a cell: what is joined within it is a fold, from 35 degrees on, or a bend
+_OFF = 1e-3  # share of a way at its ends, where it meets the faces around
+_PARTED = (
+    "give what crosses as cracks of their own, of which one ends on the other, "
+    "arm(crack, on=0, side=1), and goes on beyond as another arm, side=-1; leave out what lies "
+    "on the rest."
+)
 
 
 @dataclass(frozen=True)
@@ -286,12 +295,14 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     ------
     GeometryError
         No part of the crack lies inside the body; or the crack is smaller than a cell, or ends
-        less than half a cell inside the boundary that it comes from.
+        less than half a cell inside the boundary that it comes from; it crosses itself, or comes
+        back to within half a cell of itself.
     """
     if crack.ends_on and crack.fronts is not None:
         return crack
     placed_crack, short_fronts = _placed_crack(crack, Body.of(mesh))
     if crack.fronts is None:
+        _check_apart_from_itself(placed_crack, Body.of(mesh))
         for front in short_fronts:
             warn(
                 f"{front}: it becomes part of the mouth, the crack cuts through there and has no "
@@ -305,6 +316,49 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
                     "least three cells across what is left of the body there."
                 )
     return placed_crack
+
+
+def _check_apart_from_itself(crack: Crack, body: Body) -> None:
+    """Raise where a surface crosses itself, or parts of it face each other within half a cell."""
+    x, faces = crack.points, crack.faces
+    piece = components(faces)
+    pieces = []
+    for k in range(piece.max() + 1):
+        used_points, inverse = np.unique(faces[piece == k], return_inverse=True)
+        pieces.append(Crack(x[used_points], inverse.reshape(-1, 3), None))
+    for other, one in combinations(pieces, 2):
+        for place in meeting_points(one, other, body)[:1]:
+            raise GeometryError(f"pieces of the surface crack meet near {at(place)}: {_PARTED}")
+    middle, normal = x[faces].mean(axis=1), face_normals(x, faces)
+    reach = (_OPPOSITE * body.cell_size(middle))[:, None] * normal
+    pairs, first = np.unique(np.sort(sides(faces).reshape(-1, 2)), axis=0, return_index=True)
+    edge = x[pairs[:, 1]] - x[pairs[:, 0]]
+    # Edges first: what they cross is no matter of the mesh.
+    origin = np.concatenate([x[pairs[:, 0]], middle, middle])
+    way = np.concatenate([edge, reach, -reach])
+    owner = np.concatenate([first // 3, *[np.arange(len(faces))] * 2])
+    start, stop = origin + _OFF * way, origin + (1 - _OFF) * way
+    hit, share = first_crossing(triangle_tree(x, faces), start, stop)
+    end = start + share[:, None] * (stop - start)
+    shared = faces[owner][:, :, None] == faces[hit][:, None, :]
+    rows = np.nonzero((hit >= 0) & ~shared.any(axis=(1, 2)))[0]
+    rows = rows[body.contains(end[rows]) & body.contains(start[rows])]
+    for row, size in zip(rows.tolist(), body.cell_size(end[rows]).tolist(), strict=True):
+        is_near = (np.linalg.norm(x - end[row], axis=1) <= _ALONG * size)[faces].any(axis=1)
+        is_near[[owner[row], hit[row]]] = True
+        around = np.full(len(faces), -1)
+        around[is_near] = components(faces[is_near])
+        if around[owner[row]] == around[hit[row]]:
+            continue  # at a fold or a bend
+        if row < len(pairs):
+            raise GeometryError(f"the surface crack crosses itself near {at(end[row])}: {_PARTED}")
+        gap = float(np.linalg.norm(end[row] - origin[row]))
+        raise CoarseMeshError(
+            f"the surface crack comes back to itself: at {at(end[row])} and {at(origin[row])} it "
+            f"is {gap:.4g} apart, less than half a cell ({size / 2:.4g}), and no mesh parts that: "
+            "refine the mesh between; or where it is folded, open it to 40 degrees or more, or "
+            "leave one part out."
+        )
 
 
 def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:

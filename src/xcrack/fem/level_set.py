@@ -464,7 +464,7 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
     """
     shift = np.zeros(mesh.n_points)
     low, high = _bounds(mesh, phi)
-    cells = np.nonzero((low < 0) & (high > 0) & ~_bounds(mesh, at_end)[1])[0]
+    cells = np.nonzero((low < 0) & (high > 0) & ~(_bounds(mesh, at_end)[1] > 0))[0]
     height = (tree.corners - tree.corners[0, 0]) @ tree.normal[0]
     if np.ptp(height) < _STRAIGHT * mesh.cell_size[cells].min(initial=np.inf):
         return shift  # a plane: phi is linear
