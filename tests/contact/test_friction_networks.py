@@ -60,10 +60,10 @@ def test_stuck_branches_are_the_uncracked_body(order):
 
 
 @pytest.mark.parametrize(
-    ("n", "within"), [(21, 6e-3), pytest.param(41, 1.5e-3, marks=pytest.mark.slow)]
+    ("n", "within"), [(21, 6e-3), pytest.param(41, 1e-3, marks=pytest.mark.slow)]
 )
 def test_kink_that_rubs(n, within):
-    """The cut follows the kink: measured 3e-3 and 1.2e-3; the reference is good for 4e-4."""
+    """The cut follows the kink: measured 2e-3 and 5e-4; the reference is good for 5e-4."""
     mesh = scenes.perturbed(n, 3, lower=(-1.5, -1.5), upper=(1.5, 1.5))
     _, K = solved(pressed(mesh, [KINK], KINK_STRESS, 0.3))
     assert np.abs(K - KINK_K).max() <= within * 0.76

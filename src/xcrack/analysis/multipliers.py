@@ -549,14 +549,19 @@ def _knots_by_groups(
 
 
 def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, float]) -> Floats:
-    """Knots on a part of a crack, in proportion to the groups between each two."""
+    """Knots on a part of a crack, in proportion to the groups between each two.
+
+    They are spread between the centres of the first and the last group, as those of a whole crack:
+    the first piece at a kink, where pressures are singular, is as long as a tip's.
+    """
     density_ratio, last = hats
     s, places = lips.s[rows], np.cumsum(groups) - groups / 2
     density = np.where(_curved_points(lips, rows, places), 1.0, density_ratio)
     mean = float(groups @ density / groups.sum())
     count = max(int(mean * (groups.sum() - 1) + _BESIDES + 1e-9), 2)
     weight = groups * density
-    knots = np.interp(np.linspace(0, weight.sum(), count), np.cumsum(weight) - weight / 2, s)
+    centres = np.linspace(mean / 2, weight.sum() - mean / 2, count)
+    knots = np.interp(centres, np.cumsum(weight) - weight / 2, s)
     return _knots(knots, (float(s.min()), float(s.max())), last)
 
 
