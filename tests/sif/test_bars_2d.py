@@ -93,6 +93,26 @@ def test_kink_against_a_finer_mesh():
         assert np.abs(sif.best - fine.best).max() < 2.2e-3
 
 
+@pytest.mark.parametrize("exponent", [0, 1], ids=["jump", "bend"])
+def test_pressure_that_changes_between_points(exponent):
+    """Against cells of 2e-3 at both ends of the load; K is off by 1e-2 and 5e-4."""
+    half, line = 0.137, xc.line_crack([(-0.5, 0.03), (0.5, 0.03)])
+
+    def pressure(x):
+        return -(np.maximum(1 - np.abs(x[:, 0]) / half, 0.0) ** exponent) * (np.abs(x[:, 0]) < half)
+
+    def size(x):
+        away = np.linalg.norm(x[:, None] - [[-half, 0.03], [half, 0.03]], axis=2).min(axis=1)
+        return 2e-3 + 0.2 * away
+
+    mesh = xc.box((-1, -1), (1, 1), 14)
+    problem = xc.Problem(mesh, UNIT, [line], loads=[*PULLED, xc.crack_pressure(pressure)])
+    wanted = with_error(replace(problem, mesh=xc.refine(mesh, size=size))).best
+    sif = with_error(problem)
+    assert holds(sif, wanted)
+    assert np.abs(sif.best - wanted).max() < 0.3 * np.abs(sif.K - wanted).max()
+
+
 def pressed(mesh, line, stress=((-1.0, -0.5), (-0.5, -1.0))):
     loads = [xc.traction(side, lambda x, n: n @ np.array(stress)) for side in scenes.SIDES]
     return with_error(xc.Problem(mesh, UNIT, [xc.line_crack(line)], loads=loads, order=2))

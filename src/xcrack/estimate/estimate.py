@@ -115,11 +115,16 @@ def estimate(
 
 def pressure_on(solution: Solution, c: int) -> Floats:
     """Pressure on the faces of crack c at their points, of contact and given `(q,)`."""
-    lips = solution.lips[c]
     contact: Contact | None = solution.contact[c]
-    total = np.zeros(len(lips)) if contact is None else np.array(contact.pressure)
+    total = given_pressure(solution, c, solution.lips[c].x)
+    return total if contact is None else total + contact.pressure
+
+
+def given_pressure(solution: Solution, c: int, x: Floats) -> Floats:
+    """Pressure that the loads of a state give at places on the faces of crack c `(q,)`."""
+    total = np.zeros(len(x))
     for load, factor in solution.acting:
-        pressure = load.face_pressure(lips.x, c) if "face_pressure" in load.acts else None
+        pressure = load.face_pressure(x, c) if "face_pressure" in load.acts else None
         if pressure is not None:
             total += factor * pressure
     return total

@@ -13,7 +13,9 @@ import numpy as np
 from xcrack.analysis.solution import Solution, fields_at, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.crack import turns
-from xcrack.estimate.estimate import Estimate, pressure_on
+from xcrack.estimate.estimate import Estimate, given_pressure, pressure_on
+from xcrack.fem.facets import LipPoints, lip_points
+from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.mesh.mesh import Mesh
@@ -33,6 +35,7 @@ _LOCKS, _LEG, _REACH = 0.03, 0.4, 1.5
 # known; half-widths over the absolute products at turns, at junctions, and elsewhere.
 _AT_TURNS = -1.6
 _GAPS = (1.0, 1.9, 0.38)
+_DENSE = 24  # points of a piece of the faces, four times those of solutions
 
 
 def crack_shape(
@@ -168,13 +171,9 @@ def gap_changes(
             lips = solution.lips[other]
             cell, x = lips.cell[rows, 0], lips.x[rows]
             size = space.mesh.cell_size[cell]
-            gap = np.zeros((len(rows), 1 + m))
-            for s, sign in ((0, -1), (1, 1)):
-                side = lip_side(space, other, lips.cell[rows, s], lips.bary[rows, s], sign)
-                u, _ = fields_at(space, columns, lips.cell[rows, s], lips.bary[rows, s], side)
-                if other == c:
-                    u[..., 1:] -= singular_fields()[0][s, rows]
-                gap += sign * np.einsum("qi,qim->qm", lips.normal[rows], u)
+            gap = _gaps(space, columns, other, lips, rows)
+            if other == c:
+                gap[:, 1:] -= _across(singular_fields()[0][:, rows], lips.normal[rows])
             modulus = solution.problem.elasticity.moduli_of_cells[cell]
             part = (modulus * lips.weight[rows] / size * gap[:, 0])[:, None] * gap[:, 1:]
             bends = _locking_points(space.cracks[other].points, float(size.mean()))
@@ -186,6 +185,55 @@ def gap_changes(
             np.add.at(by_cell[k].T, cell, np.abs(part))
     factor = np.array(_GAPS)[:, None, None]
     return GapChanges(change, np.sqrt(((factor * by_zone) ** 2).sum(axis=0)), by_cell)
+
+
+def load_changes(
+    solutions: Sequence[Solution],
+    z: Floats,
+    c: int,
+    singular_on: Callable[[LipPoints], tuple[Floats, Floats]],
+) -> Floats:
+    """What given pressures change that vary between the points of the faces `(states, m)`.
+
+    The work of each on the gap of the dual solution, at points that are denser and at those of
+    the solution: exact less computed value, but for a quarter at a jump, less at a bend.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+    z : (states, n_dof, m) array
+    c : int
+        Crack of the functionals.
+    singular_on : callable
+        As `singular_part` of `crack_shape`, on faces of crack c that are given by points.
+    """
+    space, change = solutions[0].space, np.zeros((len(solutions), z.shape[2]))
+    for other, lips in enumerate(solutions[0].lips):
+        if not any(np.ptp(given_pressure(s, other, lips.x)) > 0 for s in solutions):
+            continue
+        for faces, sign in ((lips, -1.0), (lip_points(space, other, _DENSE), 1.0)):
+            singular = _across(singular_on(faces)[0], faces.normal) if other == c else 0.0
+            for k, solution in enumerate(solutions):
+                gap = _gaps(space, _columns([solution], z[[k]]), other, faces)[:, 1:] - singular
+                force = sign * faces.weight * given_pressure(solution, other, faces.x)
+                change[k] += force @ gap
+    return change
+
+
+def _gaps(
+    space: FunctionSpace, columns: Floats, c: int, lips: LipPoints, rows: Ints | slice = slice(None)
+) -> Floats:
+    """Gaps between the faces of crack c at some of their points, of each column `(q, k)`."""
+    u = []
+    for s, sign in ((0, -1), (1, 1)):
+        cell, bary = lips.cell[rows, s], lips.bary[rows, s]
+        u.append(fields_at(space, columns, cell, bary, lip_side(space, c, cell, bary, sign))[0])
+    return _across(np.stack(u), lips.normal[rows])
+
+
+def _across(u: Floats, normal: Floats) -> Floats:
+    """Opening of values on the faces - and + `(q, k)`."""
+    return np.asarray(np.einsum("qi,qik->qk", normal, u[1] - u[0]))
 
 
 def _locking_points(points: Floats, size: float) -> Floats:

@@ -14,7 +14,7 @@ from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.base.machine import threads
 from xcrack.crack.crack import kink_numbers
 from xcrack.estimate.estimate import Estimate, estimate
-from xcrack.estimate.shape import crack_shape, gap_changes, rim_shape
+from xcrack.estimate.shape import crack_shape, gap_changes, load_changes, rim_shape
 from xcrack.estimate.surplus import shares
 from xcrack.mesh.distances import distance_to_simplices
 from xcrack.mesh.locate import cell_sizes, contains
@@ -64,6 +64,8 @@ class TipErrors:
         leave; see `shape.gap_changes`.
     gap_shares : (states, tips, 2, cells) array, stress · √length
         Absolute contributions of the cells to the latter.
+    load : (states, tips, 2) array, stress · √length
+        Signed change of K with given pressures at more points of the faces.
     """
 
     eta: Floats
@@ -79,6 +81,7 @@ class TipErrors:
     gap: Floats
     gap_bar: Floats
     gap_shares: Floats
+    load: Floats
 
 
 def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
@@ -106,10 +109,13 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
 
         @cache
         def singular_fields() -> tuple[Floats, Floats]:
-            return on_faces(solutions[0], tips)
+            return on_faces(solutions[0], tips, solutions[0].lips[crack])
 
         bend, bend_bar = crack_shape(solutions, result, crack, singular_fields)
         gaps = gap_changes(solutions, result, crack, singular_fields)
+        load = load_changes(
+            solutions, result.z, crack, lambda faces: on_faces(solutions[0], tips, faces)
+        )
         rim, chords = rim_shape(solutions, result.z)
     shape = (len(solutions), len(tips), 2)
     corners = _inner_corners(solutions[0].problem.mesh)
@@ -129,6 +135,7 @@ def tip_errors(solutions: Sequence[Solution], crack: int) -> TipErrors:
         gaps.change.reshape(shape),
         gaps.bar.reshape(shape),
         gaps.by_cell.reshape(*shape, -1),
+        load.reshape(shape),
     )
 
 
@@ -218,6 +225,7 @@ _QUADRATURE = 3e-6
 _AT_CORNERS = 0.2  # of what the cells at re-entrant corners contribute
 _RIM, _CHORDS, _END = 0.03, 1.0, 0.55  # of changes of shape, and of the contact's end
 _BEND = 1.5  # of the bar of a change of shape
+_LOAD = 0.25  # of what given pressures miss between points: left by four times as many at a jump
 # Cells, by their longest edges: the shortest crack between two tips and from a mouth to a tip, and
 # the room between a tip and the next boundary or crack. Of drawn cracks between two tips the bar
 # holds in 93 % from 2.8 cells on, in 60 % from 2.5 to 2.8, in 15 % below.
@@ -330,7 +338,7 @@ def _bars(
     """Bars of one state."""
     places = [_least_at_tip(solution, crack, domain)[2] for domain in domains]
     estimate = _CAUGHT * errors.eta[k] + (_CAUGHT_AT_CORNERS - _CAUGHT) * errors.corners[k]
-    eta = estimate + errors.bend[k] + errors.rim[k] + errors.gap[k]
+    eta = estimate + errors.bend[k] + errors.rim[k] + errors.gap[k] + errors.load[k]
     clipping = _clipping(domains)[:, None] ** 2
     on_points = _SPREAD_ON_POINTS * _are_on_points(solution, crack)[:, None]
     contact = np.hypot(_END * errors.end[k], errors.gap_bar[k])
@@ -339,6 +347,7 @@ def _bars(
         _SHARES * errors.shares[k].sum(axis=-1), _SPREAD * clipping * sif.spread,
         on_points * sif.spread, _AT_KINKS * errors.kinks[k], _AT_INTERFACES * errors.interfaces[k],
         contact, _BEND * errors.bend_bar[k], _RIM * errors.rim[k],
+        _LOAD * errors.load[k],
     ]  # fmt: skip
     if any(_faces_press(solution, crack, x) for x in kinks_inside(solution, crack)):
         eta = eta - errors.bend[k]

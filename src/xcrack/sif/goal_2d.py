@@ -14,6 +14,7 @@ from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Floats
 from xcrack.estimate.dual import Goal, GoalCells, GoalPoints
 from xcrack.fem.assembly import tabulate_functions
+from xcrack.fem.facets import LipPoints
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.fem.williams import continued_polar, mode_matrix, unit_gradients
 from xcrack.mesh.simplex import simplex_rule
@@ -163,7 +164,7 @@ def _faces(
     return parts, pressure, per_stress
 
 
-def on_faces(solution: Solution, tips: Sequence[int]) -> tuple[Floats, Floats]:
+def on_faces(solution: Solution, tips: Sequence[int], lips: LipPoints) -> tuple[Floats, Floats]:
     """E'/2 q u^a_,1 on the faces - and + of a crack: values and gradients, by tip and mode.
 
     The influence function of K is singular: the dual solution less this field (the weight functions
@@ -174,15 +175,15 @@ def on_faces(solution: Solution, tips: Sequence[int]) -> tuple[Floats, Floats]:
     values : (2, q, 2, 2 tips) array
     gradients : (2, q, 2, 2, 2 tips) array
     """
-    both = [_singular_part(solution, t) for t in tips]
+    both = [_singular_part(solution, t, lips) for t in tips]
     values, gradients = zip(*both, strict=True)
     return np.concatenate(values, axis=-1), np.concatenate(gradients, axis=-1)
 
 
-def _singular_part(solution: Solution, t: int) -> tuple[Floats, Floats]:
+def _singular_part(solution: Solution, t: int, lips: LipPoints) -> tuple[Floats, Floats]:
     space, tip_material = solution.space, material_at_tip(solution, t)
     tip = space.tips[t]
-    lips, R = solution.lips[tip.crack], tip.frame
+    R = tip.frame
     radius = domain_of(solution, t).outer_radius
     outer = np.array([radius])
     values, gradients = np.zeros((2, len(lips), 2, 2)), np.zeros((2, len(lips), 2, 2, 2))
