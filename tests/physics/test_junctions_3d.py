@@ -320,7 +320,7 @@ def test_K_of_arms_by_the_distance_to_the_junction(n, order, bounds):
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [10, 12])
 def test_bars_of_arms_hold(n):
-    """K_I of arms at order 2 against the conforming mesh; 12 was not used to choose the term."""
+    """K_I of arms at order 2 against the conforming mesh, which the term was chosen on."""
     wanted = json.loads((DATA / "crossing_pennies.json").read_text())["fine"]["small"]
     own = PchipInterpolator([float(a) for a in wanted], list(wanted.values()))
     centre = np.array((0.013, 0.0, 0.017))

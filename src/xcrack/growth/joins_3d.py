@@ -123,8 +123,9 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
         + [_met_face(rule, step, plan, *pair, body, m, True) for pair in pairs_beside]
     )
+    pairs_near = [*pairs_beside, *faces]  # fronts that only touch have no face ahead
     joined_now, part = (
-        _joined_cracks(rule, _advanced(rule, step, plan, way), facing_pairs, pairs_beside, body),
+        _joined_cracks(rule, _advanced(rule, step, plan, way), facing_pairs, pairs_near, body),
         1.0,
     )
     for lesser_part in (
@@ -132,7 +133,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     ):  # fronts that overlap may join while they are apart
         cracks_before = _advanced(rule, step, plan, lesser_part * way)
         joined_sooner = _joined_cracks(
-            rule, cracks_before, facing_pairs, [*pairs_beside, *joined_now.failed], body
+            rule, cracks_before, facing_pairs, [*pairs_near, *joined_now.failed], body
         )
         if not joined_sooner.failed:
             joined_now, part = joined_sooner, lesser_part
@@ -145,17 +146,22 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         return plan
     way, time, time_at_first_rate = part * way, part * time, part * time_at_first_rate
     gain = _gain(step, joined_now.apart, rule.problem.mesh, m)
-    if pairs_beside:
+    area, area_apart, area_joined = (
+        np.array(
+            [area_inside(c, body.mesh, body_of(cracks, k, body)) for k, c in enumerate(cracks)]
+        )
+        for cracks in (step.corrected, joined_now.apart, joined_now.cracks)
+    )
+    led_on = _led_on(joined_now, area_apart, area_joined, bool(pairs_beside))
+    if led_on > 0:
         # Fronts that are led on to each other make area at once. It takes as long as fronts take
         # for as much: else on coarse cells, which lead them farther, it would cost nothing.
-        area, area_apart, area_joined = (
-            sum(area_inside(c, body.mesh, body_of(cracks, k, body)) for k, c in enumerate(cracks))
-            for cracks in (step.corrected, joined_now.apart, joined_now.cracks)
-        )
-        way_of_area = way * (area_joined - area) / max(area_apart - area, 1e-3 * area)
+        total = area.sum()
+        growth = max(area_apart.sum() - total, 1e-3 * total)
+        way_of_area = way * (1 + led_on / growth)
         time *= max(1.0, way_of_area / time_at_first_rate)
         time_at_first_rate = max(time_at_first_rate, way_of_area)
-        gain = max(gain, _gain_of(area_joined / area, m))
+        gain = max(gain, _gain_of((area_apart.sum() + led_on) / total, m))
     cycles = time * plan.cycles / gain
     cycle_error = UNKNOWN[3] * abs(time_at_first_rate * plan.cycles - cycles)
     joins_of_step = [
@@ -189,6 +195,20 @@ class _Joined:
     places: list[tuple[tuple[int, int], Floats]]
     failed: list[tuple[int, int]]
     failure: GeometryError | None = None
+
+
+def _led_on(joined_now: _Joined, area_apart: Floats, area_joined: Floats, is_beside: bool) -> float:
+    """Area of fronts that are led on for others to meet them.
+
+    What leads an arm through a face is part of its way there, but for fronts beside each other.
+    """
+    if is_beside:
+        return float(area_joined.sum() - area_apart.sum())
+    if len(area_apart) != len(area_joined):
+        return 0.0
+    pairs = zip(joined_now.apart, joined_now.cracks, strict=True)
+    is_host = np.array([one.ends_on == other.ends_on for one, other in pairs])
+    return float((area_joined - area_apart)[is_host].sum())
 
 
 def _joined_cracks(
