@@ -346,9 +346,9 @@ def _check_apart_from_itself(crack: Crack, body: Body) -> None:
     for row, size in zip(rows.tolist(), body.cell_size(end[rows]).tolist(), strict=True):
         is_near = (np.linalg.norm(x - end[row], axis=1) <= _ALONG * size)[faces].any(axis=1)
         is_near[[owner[row], hit[row]]] = True
-        around = np.full(len(faces), -1)
-        around[is_near] = components(faces[is_near])
-        if around[owner[row]] == around[hit[row]]:
+        component = np.full(len(faces), -1)
+        component[is_near] = components(faces[is_near])
+        if component[owner[row]] == component[hit[row]]:
             continue  # at a fold or a bend
         if row < len(pairs):
             raise GeometryError(f"the surface crack crosses itself near {at(end[row])}: {_PARTED}")

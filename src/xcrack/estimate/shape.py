@@ -173,7 +173,7 @@ def gap_changes(
             size = space.mesh.cell_size[cell]
             gap = _gaps(space, columns, other, lips, rows)
             if other == c:
-                gap[:, 1:] -= _across(singular_fields()[0][:, rows], lips.normal[rows])
+                gap[:, 1:] -= _opening_of(singular_fields()[0][:, rows], lips.normal[rows])
             modulus = solution.problem.elasticity.moduli_of_cells[cell]
             part = (modulus * lips.weight[rows] / size * gap[:, 0])[:, None] * gap[:, 1:]
             bends = _locking_points(space.cracks[other].points, float(size.mean()))
@@ -212,9 +212,9 @@ def load_changes(
         if not any(np.ptp(given_pressure(s, other, lips.x)) > 0 for s in solutions):
             continue
         for faces, sign in ((lips, -1.0), (lip_points(space, other, _DENSE), 1.0)):
-            singular = _across(singular_on(faces)[0], faces.normal) if other == c else 0.0
+            singular_gap = _opening_of(singular_on(faces)[0], faces.normal) if other == c else 0.0
             for k, solution in enumerate(solutions):
-                gap = _gaps(space, _columns([solution], z[[k]]), other, faces)[:, 1:] - singular
+                gap = _gaps(space, _columns([solution], z[[k]]), other, faces)[:, 1:] - singular_gap
                 force = sign * faces.weight * given_pressure(solution, other, faces.x)
                 change[k] += force @ gap
     return change
@@ -228,10 +228,10 @@ def _gaps(
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[rows, s], lips.bary[rows, s]
         u.append(fields_at(space, columns, cell, bary, lip_side(space, c, cell, bary, sign))[0])
-    return _across(np.stack(u), lips.normal[rows])
+    return _opening_of(np.stack(u), lips.normal[rows])
 
 
-def _across(u: Floats, normal: Floats) -> Floats:
+def _opening_of(u: Floats, normal: Floats) -> Floats:
     """Opening of values on the faces - and + `(q, k)`."""
     return np.asarray(np.einsum("qi,qik->qk", normal, u[1] - u[0]))
 
