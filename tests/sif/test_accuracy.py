@@ -71,9 +71,8 @@ def test_the_narrowest_place_of_a_front_is_named():
     ]
     loads = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
     (message,), sif = messages(
-        xc.Problem(mesh, xc.Isotropic(1.0, 0.3), cracks, loads=loads, order=1)
+        xc.Problem(mesh, xc.Isotropic(1.0, 0.3), cracks, loads=loads, order=1), CLIPPED
     )
-    assert CLIPPED in message
     place = np.array([float(v) for v in message.partition("[")[2].partition("]")[0].split(",")])
     assert (np.abs(place) <= 1).all()
     assert place[0] == pytest.approx(0.45)

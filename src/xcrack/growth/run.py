@@ -288,13 +288,14 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                         next_rule, cut, (next_step, reuse, end), messages
                     )
                     next_step = _with_validity(next_rule, next_step)
-                    if alarm := alarm_of_energy(next_rule, cut, next_step):
-                        warn(str(alarm))
             if other is not None:
                 reuse = reuse if other[0] is rule else run_state(last).reuse
                 rule, last = other[0], _with_plan(other[0], other[1] or last)
                 continue
             rule = next_rule
+            # Not kept with the step: a run that is resumed does not know the energy before.
+            if alarm := alarm_of_energy(rule, cut, next_step):
+                warn(str(alarm))
             last = sound_copy(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
