@@ -212,6 +212,14 @@ def crack_size(cracks: Sequence[Crack], c: int, mesh: Mesh) -> float:
     return surface_size(crack, mesh, body_of(cracks, c, Body.of(mesh)))
 
 
+def crack_areas(cracks: Sequence[Crack], mesh: Mesh) -> Floats:
+    """Areas of placed cracks that count as in `crack_size` `(c,)`, in 2D lengths."""
+    if mesh.dim == 2:
+        return np.array([length_inside(crack, mesh) for crack in cracks])
+    body = Body.of(mesh)
+    return np.array([area_inside(x, mesh, body_of(cracks, c, body)) for c, x in enumerate(cracks)])
+
+
 # Cells by which a crack must be deep at order 1 in 3D: K is up to 6.1 % low below, within 2 % above
 # (47 meshes, even and graded; in even cells around inner cracks it is within .7 % from two on).
 DEEP = 7.0
@@ -597,6 +605,7 @@ def exit_ahead(x: Floats, direction: Floats, mesh: Mesh) -> tuple[Floats, str] |
 
 __all__ = [
     "area_inside",
+    "crack_areas",
     "crack_size",
     "exit_ahead",
     "front_length_inside",

@@ -77,16 +77,14 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
     Gap or None
     """
     best: FrontGap | None = None
-    for a, b in ((one, other), (other, one)):
-        low, high = b.points.min(axis=0) - reach, b.points.max(axis=0) + reach
-        x, normal = _front_points(a, body, low, high)
+    ends = [_points_near(a, b, body, reach) for a, b in ((one, other), (other, one))]
+    for (x, normal), (y, normal_there), b in zip(ends, ends[::-1], (other, one), strict=True):
         if not len(x):
             continue
         tree = triangle_tree(b.points, b.faces)
         nearest_point = closest_in(tree, x, reach)
         rows = np.nonzero((nearest_point.triangle >= 0) & body.contains(nearest_point.foot))[0]
         feet, other_normal = nearest_point.foot[rows], tree.normal[nearest_point.triangle[rows]]
-        y, normal_there = _front_points(b, body, -np.inf, np.inf)
         if len(y):  # nearest where they come out of the body a foot would lie beyond it
             distance, place = cKDTree(y).query(x)
             near = np.nonzero(distance < reach)[0]
@@ -109,10 +107,9 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
     return best
 
 
-def _front_points(
-    crack: Crack, body: Body, low: Floats | float, high: Floats | float
-) -> tuple[Floats, Floats]:
-    """Points close along the fronts of a crack, in a box and in a body, and normals `(n, 3)`."""
+def _points_near(crack: Crack, other: Crack, body: Body, reach: float) -> tuple[Floats, Floats]:
+    """Points close along fronts in a body, near the box of another crack, and normals `(n, 3)`."""
+    low, high = other.points.min(axis=0) - reach, other.points.max(axis=0) + reach
     parts = [np.zeros((0, 6))]
     for front in front_frames(crack):
         number = np.arange(len(front.x) + front.closed)

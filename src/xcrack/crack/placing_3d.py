@@ -300,9 +300,10 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
     """
     if crack.ends_on and crack.fronts is not None:
         return crack
-    placed_crack, short_fronts = _placed_crack(crack, Body.of(mesh))
+    body = Body.of(mesh)
+    placed_crack, short_fronts = _placed_crack(crack, body)
     if crack.fronts is None:
-        _check_apart_from_itself(placed_crack, Body.of(mesh))
+        _check_apart_from_itself(placed_crack, body)
         for front in short_fronts:
             warn(
                 f"{front}: it becomes part of the mouth, the crack cuts through there and has no "

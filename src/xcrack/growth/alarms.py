@@ -8,15 +8,13 @@ from xcrack.base.arguments import arguments_of
 from xcrack.base.arrays import Floats
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import STRESS
-from xcrack.crack.junctions_3d import body_of
-from xcrack.crack.measures import area_inside, length_inside
+from xcrack.crack.measures import crack_areas
 from xcrack.fatigue.checks import evaluate_law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import PLACE
 from xcrack.growth.step import Step, place_name
 from xcrack.growth.validity import Validity, validity
-from xcrack.mesh.locate import Body
 from xcrack.model.loads import Load
 from xcrack.sif.stress_intensity import energy_release_rate
 
@@ -100,10 +98,11 @@ def alarm_of_energy(rule: GrowthRule, last: Step, step: Step) -> Alarm | None:
         return None
     if step.joins or step.arrivals or len(step.cracks) != len(last.cracks):
         return None
-    old_area, area = (_areas(each) for each in (last, step))
+    mesh = rule.problem.mesh
+    old_area, area = (crack_areas(each.cracks, mesh) for each in (last, step))
     if area.sum() < (1 + _LEAST_GROWTH) * old_area.sum():
         return None
-    old_G, G = _release(last, old_area), _release(step, area)
+    old_G, G = _release(last), _release(step)
     if old_G is None or G is None:
         return None
     by_K = float((old_G + G) @ (area - old_area)) / 2
@@ -132,20 +131,9 @@ def _has_dead_loads(rule: GrowthRule) -> bool:
     )
 
 
-def _areas(step: Step) -> Floats:
-    """Of the cracks of a step within the body, before those on which they end; lengths in 2D."""
-    mesh = step.solutions[-1].problem.mesh
-    if mesh.dim == 2:
-        return np.array([length_inside(crack, mesh) for crack in step.cracks])
-    body = Body.of(mesh)
-    parts = (body_of(step.cracks, c, body) for c in range(len(step.cracks)))
-    pairs = zip(step.cracks, parts, strict=True)
-    return np.array([area_inside(crack, mesh, part) for crack, part in pairs])
-
-
-def _release(step: Step, area: Floats) -> Floats | None:
+def _release(step: Step) -> Floats | None:
     """Mean of G over the growth of each crack `(c,)`; None where a material does not say it."""
-    result = np.zeros(len(area))
+    result = np.zeros(len(step.cracks))
     for c, (sif, rate) in enumerate(zip(step.sif[-1], step.rate, strict=True)):
         if sif.E_prime is None or sif.nu is None or not np.isfinite(rate).all():
             return None

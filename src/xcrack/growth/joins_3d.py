@@ -13,7 +13,6 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.junctions_3d import (
     FaceAhead,
-    body_of,
     crossings,
     face_ahead,
     face_led_on,
@@ -24,7 +23,7 @@ from xcrack.crack.junctions_3d import (
     renumbered_arms,
     with_room,
 )
-from xcrack.crack.measures import area_inside, crack_size
+from xcrack.crack.measures import crack_areas, crack_size
 from xcrack.crack.merging import (
     OFFSET,
     STEP,
@@ -147,9 +146,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     way, time, time_at_first_rate = part * way, part * time, part * time_at_first_rate
     gain = _gain(step, joined_now.apart, rule.problem.mesh, m)
     area, area_apart, area_joined = (
-        np.array(
-            [area_inside(c, body.mesh, body_of(cracks, k, body)) for k, c in enumerate(cracks)]
-        )
+        crack_areas(cracks, body.mesh)
         for cracks in (step.corrected, joined_now.apart, joined_now.cracks)
     )
     led_on = _led_on(joined_now, area_apart, area_joined, bool(pairs_beside))
@@ -652,6 +649,7 @@ def _gain(step: Step, cracks_now: Sequence[Crack], mesh: Mesh, exponent: float) 
 
 
 def _gain_of(area_ratio: float, exponent: float) -> float:
+    """Mean rate while an area grows by a ratio, over that at its beginning."""
     x = 0.5 * np.log(area_ratio)
     return float(exprel(x) / exprel(x - exponent / 2 * x))
 
