@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from scripts import growth_scenes
 
 BODY = xc.box((0, -20), (20, 20), (20, 40))
 EDGE = xc.line_crack([(0, 0.3), (4, 0.3)])
@@ -34,6 +35,24 @@ def test_a_scene_as_it_should_be_has_no_alarm():
     assert xc.check(scene(material), LAW, CYCLE) == ()
     steps = xc.grow(scene(material), LAW, xc.max_hoop_stress, CYCLE, da=0.5, max_steps=2)
     assert warned(lambda: list(steps)) == []
+
+
+def test_a_step_over_most_of_the_ligament_has_no_alarm():
+    """G grows by some fifty times: that it releases less than their mean is as it should be."""
+    deep = xc.line_crack([(0, 0.3), (14, 0.3)])
+    problem = xc.Problem(BODY, steel(), [deep], loads=scene().loads)
+    steps = xc.grow(problem, LAW, xc.max_hoop_stress, CYCLE, da=4.0, max_steps=2)
+    assert not any("energy" in message for message in warned(lambda: list(steps)))
+
+
+def test_a_tip_that_meets_a_face_has_no_alarm_of_energy():
+    """The mean of G leaves out the tip that is gone: half of it is released."""
+    problem, cycle, options = growth_scenes.SCENES["tip_meets_flank"]()
+    options |= {"max_steps": 2, "progress": False}
+    steps = []
+    grown = xc.grow(problem, growth_scenes.LAW, xc.max_hoop_stress, cycle, **options)
+    assert not any("energy" in message for message in warned(lambda: steps.extend(grown)))
+    assert steps[1].joins
 
 
 def unit_loads(factors):
