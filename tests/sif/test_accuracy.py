@@ -264,3 +264,20 @@ def test_order_1_is_named_before_and_after_a_solution():
     assert len(words) == 1
     with pytest.raises(xc.ProblemError, match="no ingredient"):
         xc.plan(replace(problem, order=2))["order 1"]
+
+
+def test_a_plan_says_of_arms_what_a_warning_does():
+    large, small = (
+        xc.penny_crack((0, 0, 0), (0, 0, 1), 0.6),
+        xc.penny_crack((0, 0, 0), (1, 0, 0), 0.3),
+    )
+    cracks = [large, xc.arm(small, 0, 1)]
+    pull = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
+    mesh = xc.box((-1,) * 3, (1,) * 3, 12)
+    problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), cracks, loads=pull, order=1)
+    reason = xc.plan(problem)["order 1"].reason
+    assert "K is 1 to 7 % too low" in reason
+    assert "K of arms is up to 5 % off" in reason
+    solution = xc.solve(problem)
+    with pytest.warns(xc.XcrackWarning, match="up to 5 % off below"):
+        xc.stress_intensity(solution, 1)

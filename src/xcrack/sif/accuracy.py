@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from xcrack.analysis.plan import errors_by_order
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, at
 from xcrack.base.errors import ProblemError, warn
@@ -202,8 +203,7 @@ def warn_of_order(solution: Solution, crack: int) -> None:
         return
     depth = cells_deep(x, np.concatenate(fronts), space.mesh)
     if depth < DEEP:
-        is_arm = bool(space.cracks[crack].ends_on)
-        error, rest = ("up to 5 % off", "3 %") if is_arm else ("1 to 7 % too low", "0.5 %")
+        error, rest = errors_by_order(bool(space.cracks[crack].ends_on))
         warn(
             f"order 1: crack {crack} is {depth:.2g} cells deep, and K is {error} below "
             f"{DEEP:g}, which two domains do not show. Give order=2 (within {rest}), or cells that "
