@@ -223,6 +223,13 @@ def test_options_of_growth_stand_once() -> None:
     assert not (of_grow | of_resume) & set(options)
 
 
+def test_help_shows_names_and_defaults_and_leaves_types_to_the_docstring() -> None:
+    assert str(inspect.signature(xcrack.penny_crack)) == "(center, normal, radius, *, n=128)"
+    assert str(inspect.signature(xcrack.grow)).startswith(
+        "(problem, law, criterion, cycle, da=None, *, tolerance=None, max_unknowns=None,"
+    )
+
+
 @pytest.mark.parametrize("name", ["grow", "resume"])
 def test_an_unknown_option_is_refused_by_the_name_of_the_function(name: str) -> None:
     positional = [None] * (4 + (name == "resume"))

@@ -250,8 +250,7 @@ def argument_of(table: Table, name: str, maker: Callable[..., Any]) -> Any:
     if rule is not None and rule.takes_names and isinstance(value, str):
         return value
     is_field = isinstance(rule, _FIELDS)
-    parameter = inspect.signature(maker).parameters[name]
-    dimension = LENGTH if name in _BOXES and rule is None else _dimension_of(declaration, parameter)
+    dimension = LENGTH if name in _BOXES and rule is None else _dimension_of(declaration)
     content = table.value(name, dimension, _WAY if is_field else "")
     is_flat_list = (
         isinstance(content, list) and content and not any(isinstance(v, list) for v in content)
@@ -284,12 +283,14 @@ def _file(table: Table, name: str) -> Path:
     return path
 
 
-def _dimension_of(declaration: Argument | None, parameter: inspect.Parameter) -> Dimension | None:
+def _dimension_of(declaration: Argument | None) -> Dimension | None:
     """Dimension by the rule of an argument; text is refused for numbers without a unit."""
-    unit = None if declaration is None or declaration.rule is None else declaration.rule.unit
-    if unit is not None:
+    if declaration is None:
+        return None
+    if declaration.rule is not None:
+        unit = declaration.rule.unit
         return None if callable(unit) else unit
-    return NUMBER if str(parameter.annotation) in ("<class 'float'>", "float | None") else None
+    return NUMBER if declaration.annotation in (float, float | None) else None
 
 
 __all__ = [

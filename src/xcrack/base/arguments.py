@@ -558,7 +558,8 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
     """
 
     def decorate(function: Callable[P, T]) -> Callable[P, T]:
-        parameters = inspect.signature(function).parameters.values()
+        signature = inspect.signature(function)
+        parameters = signature.parameters.values()
         takes_any = any(p.kind is inspect.Parameter.VAR_KEYWORD for p in parameters)
         bindable = [p for p in parameters if p.kind is not inspect.Parameter.VAR_KEYWORD]
         names = [p.name for p in bindable if p.kind is not inspect.Parameter.KEYWORD_ONLY]
@@ -589,9 +590,16 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
             return cast(Callable[..., T], function)(**arguments)
 
         run.__doc__ = _with_bounds(function.__doc__, function.__annotations__)
+        cast(Any, run).__signature__ = without_types(signature)
         return run
 
     return decorate
+
+
+def without_types(signature: inspect.Signature) -> inspect.Signature:
+    """What help shows: names and defaults, for the docstring says types in words."""
+    parameters = [one.replace(annotation=one.empty) for one in signature.parameters.values()]
+    return signature.replace(parameters=parameters, return_annotation=signature.empty)
 
 
 _PARAMETERS = re.compile(r"^( *)(\w+(?:, \w+)*) : (.+)$", re.MULTILINE)
@@ -703,4 +711,5 @@ __all__ = [
     "check_fields",
     "classes_of",
     "kinds_of",
+    "without_types",
 ]

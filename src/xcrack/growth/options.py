@@ -9,7 +9,16 @@ from typing import Annotated, Any, TypedDict, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from xcrack.base.arguments import Choice, Either, Function, Number, Part, Whole, arguments_of
+from xcrack.base.arguments import (
+    Choice,
+    Either,
+    Function,
+    Number,
+    Part,
+    Whole,
+    arguments_of,
+    without_types,
+)
 from xcrack.base.arrays import Floats
 from xcrack.base.description import default_keys, describe
 from xcrack.base.errors import ProblemError, warn
@@ -329,12 +338,11 @@ def lists_options(function: AnyFunction) -> AnyFunction:
     default = {each.name: each.default for each in fields(GrowthRule)}
     parameters = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
     options = [
-        inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=default[name], annotation=annotation
-        )
-        for name, annotation in GrowthOptions.__annotations__.items()
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default[name])
+        for name in GrowthOptions.__annotations__
     ]
-    cast(Any, function).__signature__ = signature.replace(parameters=[*parameters, *options])
+    shown_signature = signature.replace(parameters=[*parameters, *options])
+    cast(Any, function).__signature__ = without_types(shown_signature)
     return function
 
 
