@@ -24,6 +24,7 @@ from xcrack.fem.facets import jump_matrix, lip_points
 from xcrack.fem.function_space import function_space
 from xcrack.fem.level_set import line_levels
 from xcrack.fem.loads import known_unknowns, load_vector
+from xcrack.fem.system import CELLS
 from xcrack.linalg import direct as linear
 from xcrack.linalg.engine import ContactRows
 from xcrack.linalg.rigid_motion import free_motion
@@ -64,8 +65,8 @@ def run(n: int) -> None:
     with part("level sets"):
         levels = line_levels(mesh, problem.placed[0])
     with part("cut and space"):
-        cuts = (cut(mesh, levels),)
-        V = function_space(mesh, 2, problem.placed, cuts, numerics)
+        cuts = (cut(mesh, levels, CELLS[2]),)
+        V = function_space(mesh, 2, problem.placed, cuts, numerics, CELLS[2])
         lips = (lip_points(V, 0),)
         _ = V.signature
     with part("bulk"):

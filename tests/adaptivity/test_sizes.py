@@ -11,7 +11,7 @@ import pytest
 import xcrack as xc
 from xcrack.adaptivity import sizes_3d
 from xcrack.adaptivity.indicators import counted_places, values
-from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.adaptivity.resolved import resolved_fronts, resolved_tips
 from xcrack.adaptivity.sizes_2d import size_ratios
 from xcrack.mesh.locate import locate
 from xcrack.mesh.refinement import refine_to
@@ -34,8 +34,8 @@ def test_a_mesh_that_is_fine_enough_stays():
     crack = xc.line_crack([(20.3, 20.1), (21.0, 20.5)])
     steel = xc.Isotropic(1.0, 0.3, plane="strain")
     problem = xc.Problem(xc.box((0, 0), (50, 50), 6), steel, [crack])
-    fine = resolved_problem(problem)
-    assert resolved_problem(fine) is fine
+    fine = resolved_tips(problem)
+    assert resolved_tips(fine) is fine
     assert len(fine.mesh.cells) > len(problem.mesh.cells)
 
 
@@ -68,7 +68,7 @@ def test_a_crack_within_a_cell_in_3d(crack, radius, tips):
     assert problem.mesh.cell_size.min() > 0.8
     with pytest.raises(xc.GeometryError):
         _ = problem.placed
-    placed = resolved_problem(problem)
+    placed = resolved_fronts(problem)
     assert placed.placed[0].n_tips == tips
     mesh = sizes_3d.first_mesh(problem)
     x = placed.placed[0].points[placed.placed[0].fronts[0]]
@@ -208,7 +208,7 @@ def test_each_front_has_cells_of_its_own_size():
         xc.penny_crack((-0.5, 0.0, 0.0), (0, 0, 1), 0.25),
         xc.penny_crack((0.6, 0.0, 0.0), (0, 0, 1), 0.1),
     ]
-    problem = resolved_problem(block(*cracks))
+    problem = resolved_fronts(block(*cracks))
     mesh = sizes_3d.first_mesh(problem)
     at = [mesh.cell_tree.query(c.points[c.fronts[0]])[1] for c in problem.placed]
     large, small = (float(np.median(mesh.cell_size[own])) for own in at)

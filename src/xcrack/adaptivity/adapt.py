@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Annotated, Any
 
@@ -11,24 +11,39 @@ import numpy as np
 from xcrack.adaptivity import sizes_2d, sizes_3d
 from xcrack.adaptivity.adaptation import Adaptation, AdaptationPass
 from xcrack.adaptivity.indicators import Indicators, indicators_of
-from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.adaptivity.resolved import resolved_fronts, resolved_tips
 from xcrack.base.arguments import Items, Number, Progress, Whole, check_arguments
 from xcrack.base.errors import GeometryError, ProblemError, SizeError, collected_warnings, warn
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem, ProblemArgument
 
-_FIRST: dict[int, Callable[[Problem, float], Mesh]] = {
-    2: lambda problem, _: sizes_2d.first_mesh(problem), 3: sizes_3d.coarse_mesh,
-}  # fmt: skip
-_NEXT: dict[int, Callable[[Indicators, float, float, int], Mesh | None]] = {
-    2: sizes_2d.next_mesh, 3: sizes_3d.next_mesh,
-}  # fmt: skip
-_TRUSTED: dict[int, Callable[[Indicators, Indicators | None], Indicators]] = {
-    2: sizes_2d.trusted_errors, 3: sizes_3d.trusted_errors,
+
+@dataclass(frozen=True)
+class _Refinement:
+    """How a mesh becomes finer around tips, or along fronts.
+
+    `most_unknowns` are what a solution takes minutes for.
+    """
+
+    resolve_cracks: Callable[[Problem], Problem]
+    first_mesh: Callable[[Problem, float], Mesh]
+    next_mesh: Callable[[Indicators, float, float, int], Mesh | None]
+    trusted_errors: Callable[[Indicators, Indicators | None], Indicators]
+    most_rounds: int
+    most_unknowns: int
+
+
+_REFINEMENT = {
+    2: _Refinement(
+        resolved_tips, sizes_2d.first_mesh, sizes_2d.next_mesh, sizes_2d.trusted_errors,
+        most_rounds=14, most_unknowns=1_000_000,
+    ),
+    3: _Refinement(
+        resolved_fronts, sizes_3d.coarse_mesh, sizes_3d.next_mesh, sizes_3d.trusted_errors,
+        most_rounds=6, most_unknowns=500_000,
+    ),
 }  # fmt: skip
 _ORDER = 2
-_MOST_ROUNDS = {2: 14, 3: 6}
-_MOST_UNKNOWNS = {2: 1_000_000, 3: 500_000}  # what a solution takes minutes for
 _AIM = 0.5  # of the tolerance: bars of the next mesh are foretold to a factor of two
 _STALLED = 0.9  # a bar that falls to no less than this share has another cause than the cells
 
@@ -88,11 +103,12 @@ def adapt(
     A bar knows nothing of a wrong load, and of a body that is not linear elastic. The rule by which
     cells are refined is that of equal shares (Becker and Rannacher, 2001, Acta Numerica 10, 1).
     """
-    most_unknowns = _MOST_UNKNOWNS[problem.mesh.dim] if max_unknowns is None else max_unknowns
-    problem = resolved_problem(problem)
+    refinement = _REFINEMENT[problem.mesh.dim]
+    most_unknowns = refinement.most_unknowns if max_unknowns is None else max_unknowns
+    problem = refinement.resolve_cracks(problem)
     _check_scene(problem)
     load_states = [None] if states is None else states
-    scene = replace(problem, mesh=_FIRST[problem.mesh.dim](problem, tolerance), order=_ORDER)
+    scene = replace(problem, mesh=refinement.first_mesh(problem, tolerance), order=_ORDER)
     return _adaptation_passes(scene, load_states, tolerance, most_unknowns, progress)
 
 
@@ -103,6 +119,7 @@ def _adaptation_passes(
     most_unknowns: int,
     progress: bool | str,
 ) -> Adaptation:
+    refinement = _REFINEMENT[scene.mesh.dim]
     rounds: list[AdaptationPass] = []
     measured_pass, messages = _measure_pass(scene, states, None, rounds)
     if rounds[0].unknowns > most_unknowns:
@@ -119,12 +136,12 @@ def _adaptation_passes(
         )
         if has_met:
             break
-        if len(rounds) == _MOST_ROUNDS[scene.mesh.dim]:
+        if len(rounds) == refinement.most_rounds:
             reason = f"{len(rounds)} rounds have not been enough"
             break
         if not measured_pass.K.any():
             break  # at rest, or shut everywhere: no cell brings K, nor a scale for its error
-        mesh = _NEXT[scene.mesh.dim](measured_pass, tolerance, aim, most_unknowns)
+        mesh = refinement.next_mesh(measured_pass, tolerance, aim, most_unknowns)
         if mesh is None:
             reason = (
                 f"the next mesh would have more than {most_unknowns} unknowns: allow more with "
@@ -170,7 +187,8 @@ def _measure_pass(
     messages: list[str] = []
     start = perf_counter()
     with collected_warnings(messages):
-        indicators = _TRUSTED[scene.mesh.dim](indicators_of(scene, states), last_indicators)
+        indicators = indicators_of(scene, states)
+        indicators = _REFINEMENT[scene.mesh.dim].trusted_errors(indicators, last_indicators)
     unknowns, seconds = indicators.solutions[0].space.n_dof, perf_counter() - start
     rounds.append(
         AdaptationPass(

@@ -1,6 +1,6 @@
 """One round: solve, K with error bars, and what the cells contribute to them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -141,7 +141,11 @@ def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
                 rows[k] = replace(sifs[k], errors=errors)
             shares.append(shares_of_crack.reshape(-1, shares_of_crack.shape[-1]))
         by_crack.append(rows)
-    surface_reach = _BESIDE[problem.mesh.dim](problem)
+    # Fronts that end at no side have no places beside one.
+    surface_reach = tuple(
+        _SHARE * surface_size(crack, problem.mesh) if len(ending_fronts(rows[0])) else 0.0
+        for crack, rows in zip(problem.placed, by_crack, strict=True)
+    )
     sifs_of = tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions)))
     best, bar = values(sifs_of, numbers_under_load, surface_reach)
     return Indicators(
@@ -189,16 +193,8 @@ def ending_fronts(sif: SIF) -> Ints:
     return np.union1d(sif.front[sif.at_surface], [end.front for end in sif.ends]).astype(np.int64)
 
 
-def _beside_in_3d(problem: Problem) -> tuple[float, ...]:
-    return tuple(_SHARE * surface_size(crack, problem.mesh) for crack in problem.placed)
-
-
 _FAINT = 1e-4  # of K by the mean energy of the body: a smaller one counts as this
 _SHARE = 0.5  # of a crack's size, half the radius of a penny
-_BESIDE: dict[int, Callable[[Problem], tuple[float, ...]]] = {
-    2: lambda problem: (0.0,) * len(problem.cracks),
-    3: _beside_in_3d,
-}
 
 
 def live_states(indicators: Indicators) -> list[int]:

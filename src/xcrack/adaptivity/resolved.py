@@ -127,12 +127,11 @@ def _outline(crack: Crack, body: Body) -> tuple[Floats, float]:
     return x, area / length / CELLS if length > 0 else np.inf
 
 
-_OF_DIMENSION = {2: (_hidden_tips, _sizes_at_lines), 3: (_hidden_fronts, _sizes_at_outlines)}
 _TRIALS = 5  # each on cells of half the size
 
 
-def resolved_problem(problem: Problem) -> Problem:
-    """The scene on a mesh that is fine enough to tell tips and fronts of its cracks from mouths.
+def resolved_tips(problem: Problem) -> Problem:
+    """The scene on a mesh that is fine enough to tell tips of its cracks from mouths.
 
     Cells around the ends of a crack become a quarter of its length, or as small as what lies
     between two ends asks for; smaller ones where that does not do. A mesh that is fine enough
@@ -151,7 +150,19 @@ def resolved_problem(problem: Problem) -> Problem:
     CoarseMeshError
         No mesh will do: the message of the last one.
     """
-    hidden_ends, edge_lengths = _OF_DIMENSION[problem.mesh.dim]
+    return _resolved(problem, _hidden_tips, _sizes_at_lines)
+
+
+def resolved_fronts(problem: Problem) -> Problem:
+    """The scene on a mesh that is fine enough to tell fronts from mouths, as `resolved_tips`."""
+    return _resolved(problem, _hidden_fronts, _sizes_at_outlines)
+
+
+def _resolved(
+    problem: Problem,
+    hidden_ends: Callable[[Problem], bool],
+    edge_lengths: Callable[[Problem, int], Callable[[Floats], Floats]],
+) -> Problem:
     if _fits(problem) and not hidden_ends(problem):
         return problem
     for trial in range(_TRIALS):
@@ -170,4 +181,4 @@ def _fits(problem: Problem) -> bool:
     return True
 
 
-__all__ = ["CELLS", "resolved_problem"]
+__all__ = ["CELLS", "resolved_fronts", "resolved_tips"]

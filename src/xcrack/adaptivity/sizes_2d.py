@@ -72,7 +72,7 @@ _KINK = 20.0  # cells of a crack's length at its kinks: stresses are singular th
 _SLOPE = 0.4  # growth of cells a length
 
 
-def first_mesh(problem: Problem) -> Mesh:
+def first_mesh(problem: Problem, _: float) -> Mesh:
     """The mesh of a scene in 2D, finer at tips and kinks where it is coarser than they are."""
     place, size = tip_sizes(problem)
     bends = [

@@ -17,7 +17,7 @@ from xcrack.adaptivity.indicators import (
     live_states,
     values,
 )
-from xcrack.adaptivity.resolved import CELLS, resolved_problem
+from xcrack.adaptivity.resolved import CELLS, resolved_fronts
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import surface_size
@@ -46,7 +46,7 @@ def coarse_mesh(problem: Problem, tolerance: float) -> Mesh:
 
 def first_mesh(problem: Problem, coarseness: float = 1.0) -> Mesh:
     """The mesh of a scene in 3D, finer along fronts where it is coarser than the crack is small."""
-    problem = resolved_problem(problem)
+    problem = resolved_fronts(problem)
     return refine(problem.mesh, size=graded_sizes(*_first_sizes(problem, coarseness)))
 
 

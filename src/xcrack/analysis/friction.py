@@ -5,7 +5,7 @@ function, which are positive, so that it holds everywhere. The slip counts from 
 or from what an earlier crack state left behind.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -72,7 +72,7 @@ def slip_of(
     result: list[SlipField | None] = [None] * len(model.lips)
     for each in works:
         slip = np.stack([jump @ u for jump in each.jumps], axis=1)
-        result[each.crack] = _LEFT[model.space.dim](model, each, slip)
+        result[each.crack] = _SLIP[model.space.dim].slip_left(model, each, slip)
     return tuple(result)
 
 
@@ -92,7 +92,7 @@ def weak_slip(
     lips = model.lips[m.crack]
     slip = np.zeros((len(lips), tangents.shape[1]))
     if earlier_slip is not None and len(earlier_slip.slip):
-        slip = _AGAIN[model.space.dim](model, m.crack, tangents, earlier_slip)
+        slip = _SLIP[model.space.dim].slip_before(model, m.crack, tangents, earlier_slip)
     return np.asarray((m.values.T @ (lips.weight[:, None] * slip)).T)
 
 
@@ -127,10 +127,6 @@ def _again_3d(model: System, c: int, tangents: Floats, earlier_slip: SlipField) 
         (distance <= earlier_slip.place[nearest])[:, None], earlier_slip.slip[nearest], 0.0
     )
     return np.einsum("qmd,qd->qm", tangents, slip)
-
-
-_LEFT = {2: _left_2d, 3: _left_3d}
-_AGAIN = {2: _again_2d, 3: _again_3d}
 
 
 def _places(points: Floats, lips: LipPoints) -> Floats:
@@ -381,7 +377,7 @@ def tangents(lips: LipPoints) -> Floats:
     are farthest from, laid onto the face, the second normal × first: both are continuous along
     curved faces.
     """
-    return _TANGENTS[lips.x.shape[1]](lips)
+    return _SLIP[lips.x.shape[1]].tangents(lips)
 
 
 def _tangents_2d(lips: LipPoints) -> Floats:
@@ -400,7 +396,19 @@ def _tangents_3d(lips: LipPoints) -> Floats:
     return np.stack([first, np.cross(n, first)], axis=1)
 
 
-_TANGENTS = {2: _tangents_2d, 3: _tangents_3d}
+@dataclass(frozen=True)
+class _Slip:
+    """Slip that a state leaves, what of it is found again on a crack that has grown, directions."""
+
+    slip_left: Callable[[System, FrictionWork, Floats], SlipField]
+    slip_before: Callable[[System, int, Floats, SlipField], Floats]
+    tangents: Callable[[LipPoints], Floats]
+
+
+_SLIP = {
+    2: _Slip(_left_2d, _again_2d, _tangents_2d),
+    3: _Slip(_left_3d, _again_3d, _tangents_3d),
+}
 
 
 def tangential_rows(space: FunctionSpace, m: Multipliers, lips: LipPoints) -> list[sp.csr_matrix]:

@@ -192,8 +192,6 @@ def _two_digits(number: int) -> str:
 
 # Functions that a scene needs, and the report of them.
 
-_ENDS = {2: "tip(s)", 3: "front(s)"}
-
 
 @dataclass(frozen=True)
 class Ingredient:
@@ -405,7 +403,7 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
     reach = (
         "within a fixed radius" if problem.numerics.enrichment == "geometric" else "tip cells only"
     )
-    reason = f"{sum(n_tips)} {_ENDS[problem.mesh.dim]}, {what_each}, {reach}"
+    reason = f"{sum(n_tips)} {GEOMETRY[problem.mesh.dim].end}(s), {what_each}, {reach}"
     return Ingredient("tip functions", True, reason + (f"; left out: {absence}" if absence else ""))
 
 

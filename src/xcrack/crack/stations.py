@@ -51,6 +51,9 @@ class Geometry:
     end_frames : callable
         Of a placed crack: points of each tip `(2,)` or front `(m, 3)`, and frames there with rows
         (ahead, normal), in 3D (ahead, normal, along).
+    end, station, size : str
+        What messages and reports call an end, a place of it where K is known, and the measure of a
+        crack.
     """
 
     place: Callable[[Crack, Mesh], Crack]
@@ -60,6 +63,9 @@ class Geometry:
     on_mesh: Callable[[Crack, Mesh], Crack]
     short_fronts: Callable[[Crack, Mesh], list[ShortFront]]
     end_frames: Callable[[Crack], CutEnds]
+    end: str
+    station: str
+    size: str
 
 
 def _fronts(crack: Crack) -> CutEnds:
@@ -76,6 +82,9 @@ GEOMETRY = {
         on_mesh=vertices_on_mesh,
         short_fronts=lambda crack, mesh: [],
         end_frames=tip_frames,
+        end="tip",
+        station="tip",
+        size="length",
     ),
     3: Geometry(
         place_surface,
@@ -85,6 +94,9 @@ GEOMETRY = {
         on_mesh=lambda crack, mesh: crack,
         short_fronts=short_fronts,
         end_frames=_fronts,
+        end="front",
+        station="front place",
+        size="area",
     ),
 }
 

@@ -15,7 +15,7 @@ from xcrack.base.machine import (
     one_blas_thread,
     stream_tasks,
 )
-from xcrack.fem.facets import LipPoints, part_points, split_facets
+from xcrack.fem.facets import LipPoints, part_points
 from xcrack.fem.function_space import Batch, FunctionSpace
 from xcrack.fem.quadrature import (
     Points,
@@ -87,7 +87,7 @@ def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     mesh = space.mesh
     facet_ids, inverse = np.unique(mesh.cell_to_facet[cells].ravel(), return_inverse=True)
     ends = mesh.facets[facet_ids]
-    parts = split_facets(space, ends)
+    parts = space.geometry.split_facets(space, ends)
     piece, place, weight = part_points(space, ends[parts.number], parts.bary)
     at = np.einsum("qv,qvb->qb", place, parts.bary[piece])
     facet = parts.number[piece]

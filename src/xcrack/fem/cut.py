@@ -358,7 +358,47 @@ class _Lips:
     bary: Floats
 
 
-def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
+@dataclass(frozen=True)
+class CellGeometry:
+    """What cells of a plane body and of one in space do in ways of their own.
+
+    Attributes
+    ----------
+    end_parts : callable
+        Cells at tips or fronts, in parts.
+    lips_up_to_ends : callable
+        Where lips on facets of the mesh end.
+    tip_radii : callable
+        Of the disc around each tip, or the tube around each front, by crack.
+    split_facets : callable
+        Facets `(k, d)`, given by their points, split where cracks cross them, as `FacetParts`; in
+        3D those of cells at a front along psi too.
+    facet_points : callable
+        Integration points of `part_points`.
+    lip_positions : callable
+        Along the crack from where it enters the body; zero in 3D, where points have no order.
+    joined_cuts : callable
+        Cuts without what lies beyond junctions, and the junctions in the mesh.
+    nodes_at_joint : callable
+        Nodes that a junction may change, and those close to it.
+    least_trace : float
+        Share of the largest singular value below which traces of enriched functions on supports do
+        not count. A tube that just reaches a side of a 3D body has traces there so small that they
+        would buy any value with a coefficient of any size inside the body.
+    """
+
+    end_parts: Callable[..., Any]
+    lips_up_to_ends: Callable[..., tuple[Floats, Ints]]
+    tip_radii: Callable[..., list[tuple[float, ...]]]
+    split_facets: Callable[..., Any]
+    facet_points: Callable[..., tuple[Ints, Floats, Floats]]
+    lip_positions: Callable[[Floats, Floats, Floats], Floats]
+    joined_cuts: Callable[..., Any]
+    nodes_at_joint: Callable[..., tuple[Bools, Bools]]
+    least_trace: float
+
+
+def cut(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> Cut:
     """Cut a mesh along the level sets of a crack."""
     phi = level_set.phi
     values = phi[mesh.cells]
@@ -391,13 +431,11 @@ def cut(mesh: Mesh, level_set: LevelSet) -> Cut:
         bary, fraction, side, parent = cut_simplices(values[cells], corners)
         subs = [(cells[parent], bary, fraction, side)]
         lips = [_inner_lips(candidates[owner[is_through[owner]]], lip[is_through[owner]])]
-    for end_subs, end_lips, entry in _GEOMETRY[mesh.dim].end_parts(
-        mesh, level_set, positions, has_position
-    ):
+    for end_subs, end_lips, entry in geometry.end_parts(mesh, level_set, positions, has_position):
         subs.append(end_subs)
         lips.append(_inner_lips(*end_lips))
         edge_flag[entry] = True
-    lips.append(_facet_lips(mesh, level_set))
+    lips.append(_facet_lips(mesh, level_set, geometry))
     lip_cell = np.concatenate([part.cell for part in lips])
     lip_bary = np.concatenate([part.bary for part in lips])
     return Cut(
@@ -457,7 +495,7 @@ def _edge_positions(mesh: Mesh, phi: Floats) -> tuple[Floats, Bools]:
         return np.where(has_position, a / (a - b), np.nan), has_position
 
 
-def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
+def _facet_lips(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> _Lips:
     """Crack faces that lie on facets of the mesh, each assembled once from its two cells."""
     d = mesh.dim
     on_crack = level_set.phi == 0
@@ -476,7 +514,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet) -> _Lips:
     if not len(facets):
         return no_lips
     cells = np.where(side[:, :1] > 0, cells[:, ::-1], cells)
-    x, row = _GEOMETRY[d].lips_up_to_ends(mesh, level_set, facets, cells, psi)
+    x, row = geometry.lips_up_to_ends(mesh, level_set, facets, cells, psi)
     cells = cells[row]
     bary = np.stack(
         [
@@ -494,31 +532,11 @@ def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
     nodes = mesh.points[mesh.cells[cell[:, 1]]]
     corners = np.einsum("lvb,lbd->lvd", bary[:, 1], nodes - nodes[:, :1])
     slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
-    normal = _GEOMETRY[mesh.dim].normals_of(corners)
+    # In 2D across the segment and the direction out of the plane.
+    edges = np.zeros((2, len(corners), 3))
+    edges[0, :, 2] = 1.0
+    edges[3 - mesh.dim :, :, : mesh.dim] = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
+    normal = np.cross(*edges)[:, : mesh.dim]
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.maximum(length, 1e-300)
     return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])
-
-
-def _across_segments(corners: Floats) -> Floats:
-    segment = corners[:, 1] - corners[:, 0]
-    return np.stack([-segment[:, 1], segment[:, 0]], axis=1)
-
-
-def _across_triangles(corners: Floats) -> Floats:
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
-@dataclass(frozen=True)
-class _Geometry:
-    """Cells at tips or fronts, where lips on facets of the mesh end, a vector across a lip."""
-
-    end_parts: Callable[..., Any]
-    lips_up_to_ends: Callable[..., tuple[Floats, Ints]]
-    normals_of: Callable[[Floats], Floats]
-
-
-_GEOMETRY = {
-    2: _Geometry(tip_parts, lips_up_to_tips, _across_segments),
-    3: _Geometry(front_parts, lips_up_to_fronts, _across_triangles),
-}

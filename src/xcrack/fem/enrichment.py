@@ -186,35 +186,6 @@ def _to_sides(body: Body, x: Floats, is_closed: bool) -> float:
 _WHOLE = {(2, 2): 1.5}
 
 
-_RADII = {2: disc_radii, 3: front_radii}
-
-
-def tip_radii(
-    mesh: Mesh,
-    cracks: tuple[Crack, ...],
-    cuts: tuple[Cut, ...],
-    order: int,
-    radius: float | None,
-    meeting: Floats,
-) -> list[tuple[float, ...]]:
-    """Radius of the enriched disc around each tip, in 3D of the tube around each front, by crack.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    cracks : tuple of Crack
-    cuts : tuple of Cut
-    order : int
-        Of the standard functions.
-    radius : float, length, optional
-        Shrunk only where the body or another tip demands; see `disc_radii` and `front_radii` for
-        what is taken without it.
-    meeting : (k, d) array, length
-        Where cracks end on others.
-    """
-    return _RADII[mesh.dim](mesh, cracks, cuts, order, radius, meeting)
-
-
 def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
     """Nodes whose support the crack splits, without those of the tip cells `(n_nodes,)`.
 

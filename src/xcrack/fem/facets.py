@@ -34,14 +34,6 @@ class FacetParts:
     side: Ints
 
 
-def split_facets(space: FunctionSpace, ends: Ints) -> FacetParts:
-    """Split facets `(k, d)`, given by their points, where cracks cross them.
-
-    In 3D those of cells at a front are split along psi too.
-    """
-    return _SPLIT[space.dim](space, ends)
-
-
 def part_points(
     space: FunctionSpace, nodes: Ints, bary: Floats, n: int = 6, halvings: int = 0
 ) -> tuple[Ints, Floats, Floats]:
@@ -72,16 +64,16 @@ def part_points(
         Length or area.
     """
     x = np.einsum("svm,smd->svd", bary, space.mesh.points[nodes])
-    return _POINTS[space.dim](space, x, nodes, bary, n, halvings)
+    return space.geometry.facet_points(space, x, nodes, bary, n, halvings)
 
 
-def _on_segments(
+def points_on_segments(
     space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int, halvings: int
 ) -> tuple[Ints, Floats, Floats]:
     return segment_points(space, np.ascontiguousarray(x[:, 0]), np.ascontiguousarray(x[:, 1]), n)
 
 
-def _on_triangles(
+def points_on_triangles(
     space: FunctionSpace, x: Floats, nodes: Ints, bary: Floats, n: int, halvings: int
 ) -> tuple[Ints, Floats, Floats]:
     area = np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 2
@@ -107,7 +99,7 @@ def _longest_side(x: Floats) -> Floats:
     return np.asarray(np.linalg.norm(x[:, [1, 2, 0]] - x, axis=2).max(axis=1))
 
 
-def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
+def split_edges(space: FunctionSpace, ends: Ints) -> FacetParts:
     from xcrack.mesh.kernels.splitting import split_segments
 
     edge = numbers_of(space.mesh, ends)  # in 2D facets are edges
@@ -120,7 +112,7 @@ def _split_segments(space: FunctionSpace, ends: Ints) -> FacetParts:
     return FacetParts(*split_segments(np.array(ends), position, level))
 
 
-def _split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
+def split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
     k = len(ends)
     number, bary = np.arange(k), np.broadcast_to(np.eye(3), (k, 3, 3))
     side = np.zeros((k, len(space.cuts)), dtype=np.int64)
@@ -149,10 +141,6 @@ def _touched_facets(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
         flag[mesh.cell_to_facet[cells]] = True
         flags.append(flag)
     return flags[0], flags[1]
-
-
-_SPLIT = {2: _split_segments, 3: _split_triangles}
-_POINTS = {2: _on_segments, 3: _on_triangles}
 
 
 def _split_parts(
@@ -226,7 +214,7 @@ def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
     at = np.einsum("qv,qsvb->qsb", place, bary[k])
     corners = cut.lip_points(mesh)
     x = np.einsum("qv,qvd->qd", place, corners[k])
-    s = _POSITION[mesh.dim](space.cracks[c].points, x, corners)
+    s = space.geometry.lip_positions(space.cracks[c].points, x, corners)
     order = np.argsort(s, kind="stable")
     k = k[order]
     return LipPoints(
@@ -240,18 +228,15 @@ def lip_points(space: FunctionSpace, c: int, n: int = 6) -> LipPoints:
     )
 
 
-def _along_line(polyline: Floats, x: Floats, corners: Floats) -> Floats:
+def positions_along_line(polyline: Floats, x: Floats, corners: Floats) -> Floats:
     ends = corners.reshape(-1, 2)
     s = arc_position(polyline, np.concatenate([ends, x]))
     return np.asarray(s[len(ends) :] - s[: len(ends)].min(initial=np.inf))
 
 
-def _without_order(points: Floats, x: Floats, corners: Floats) -> Floats:
+def positions_on_surface(points: Floats, x: Floats, corners: Floats) -> Floats:
     """A surface has no order of its points."""
     return np.zeros(len(x))
-
-
-_POSITION = {2: _along_line, 3: _without_order}
 
 
 def arc_position(polyline: Floats, x: Floats) -> Floats:

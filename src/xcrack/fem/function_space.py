@@ -15,13 +15,12 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.stations import GEOMETRY
-from xcrack.fem.cut import Cut
+from xcrack.fem.cut import CellGeometry, Cut
 from xcrack.fem.enrichment import (
     divided_points,
     heaviside_nodes,
     node_level,
     tip_points,
-    tip_radii,
 )
 from xcrack.fem.joints_2d import Joint
 from xcrack.fem.williams import polar_coordinates, tip_values
@@ -94,6 +93,8 @@ class FunctionSpace:
         Heaviside function of each node for each crack, or -1.
     tips : tuple of Tip
     n_nodes, n_functions : int
+    geometry : CellGeometry
+        What differs between 2D and 3D.
     joints : tuple of Joint
         Where cracks end on others.
     """
@@ -106,6 +107,7 @@ class FunctionSpace:
     tips: tuple[Tip, ...]
     n_nodes: int
     n_functions: int
+    geometry: CellGeometry
     joints: tuple[Joint, ...] = ()
 
     @cached_property
@@ -360,6 +362,7 @@ def function_space(
     cracks: tuple[Crack, ...],
     cuts: tuple[Cut, ...],
     numerics: Numerics,
+    geometry: CellGeometry,
     joints: tuple[Joint, ...] = (),
     jumps: tuple[Bools, ...] | None = None,
 ) -> FunctionSpace:
@@ -385,7 +388,7 @@ def function_space(
         heaviside.append(lock(number))
         count += int(flag.sum())
     meeting = np.array([joint.centre for joint in joints]).reshape(-1, mesh.dim)
-    radii = tip_radii(mesh, cracks, cuts, order, numerics.radius, meeting)
+    radii = geometry.tip_radii(mesh, cracks, cuts, order, numerics.radius, meeting)
     tips = []
     for c, cut in enumerate(cuts):
         x, frame = GEOMETRY[mesh.dim].end_frames(cracks[c])
@@ -404,4 +407,4 @@ def function_space(
             count += numerics.functions * int(flag.sum())
             tips.append(Tip(c, k, x[k], frame[k], radii[c][k], numerics.functions, lock(number)))
     functions = tuple(heaviside), tuple(tips), n_nodes, count
-    return FunctionSpace(mesh, order, cracks, cuts, *functions, joints)
+    return FunctionSpace(mesh, order, cracks, cuts, *functions, geometry, joints)

@@ -34,7 +34,7 @@ def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
     result = [number >= 0 for number in space.heaviside]
     for joint in space.joints:
         ending_cut, on = space.cuts[joint.crack], space.cuts[joint.on]
-        inner, is_beside = _NEIGHBOURHOOD[space.dim](space, joint)
+        inner, is_beside = space.geometry.nodes_at_joint(space, joint)
         cells = np.nonzero(inner[space.cell_nodes].any(axis=1))[0]
         subs = sub_cells(space, cells)
         # Ahead of a tip the level set changes its sign too, but cuts nothing.
@@ -50,21 +50,18 @@ def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
     return tuple(result)
 
 
-def _around_point(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
+def nodes_around_point(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
     """Nodes in 2D that a junction may change, and those close to it `(nodes,)`."""
     size = space.mesh.cell_size[cells_around(space.mesh, joint.centre, 1e-9)].max()
     distance = np.linalg.norm(space.node_points - joint.centre, axis=1)
     return _nodes_of(space, joint.near), distance < _BESIDE * size
 
 
-def _along_line(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
+def nodes_along_line(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
     """Nodes in 3D next to cells that both cracks cut `(nodes,)`, twice."""
     both = _nodes_of(space, joint.both)
     inner = _nodes_of(space, np.asarray(both[space.cell_nodes].any(axis=1)))
     return inner, inner
-
-
-_NEIGHBOURHOOD = {2: _around_point, 3: _along_line}
 
 
 def _nodes_of(space: FunctionSpace, cells: Bools) -> Bools:
@@ -85,4 +82,4 @@ def _parted_nodes(space: FunctionSpace, subs: SubCells, c: int, chosen: Bools) -
     return result
 
 
-__all__ = ["jump_nodes"]
+__all__ = ["jump_nodes", "nodes_along_line", "nodes_around_point"]

@@ -9,7 +9,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.checks import value_text
 from xcrack.base.errors import ProblemError
 from xcrack.fem.assembly import MeshLoad
-from xcrack.fem.facets import LipPoints, jump_values, part_points, split_facets
+from xcrack.fem.facets import LipPoints, jump_values, part_points
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, nearest_nodes, nearest_point, numbers_of
@@ -192,7 +192,7 @@ def _points_on_facets(
     mesh = space.mesh
     number = numbers_of(mesh, facets)
     cell = mesh.facet_to_cell[number, 0]
-    parts = split_facets(space, facets)
+    parts = space.geometry.split_facets(space, facets)
     k, place, weight = part_points(space, facets[parts.number], parts.bary, n, halvings)
     owner = parts.number[k]
     c = cell[owner]
@@ -276,10 +276,6 @@ def on_mesh(
 # What supports impose: which unknowns are known, and their values.
 
 _TRACE = 1e-13  # enriched functions below this value on a facet do not act there (round-off)
-# Share of the largest singular value below which traces of enriched functions do not count. A tube
-# that just reaches a side of a 3D body has traces there so small that they would buy any value with
-# a coefficient of any size inside the body.
-_LEAST = {2: 1e-11, 3: 1e-3}
 
 
 @dataclass(frozen=True, eq=False)
@@ -490,7 +486,8 @@ def _fit(space: FunctionSpace, support: Support) -> tuple[Ints, Floats]:
     solution = np.zeros((len(unknowns), space.dim))
     solution[standard] = np.linalg.lstsq(A[:, standard], target, rcond=1e-11)[0]
     scale = _scales(space)[unknowns]
-    correction = np.linalg.lstsq(A / scale, target - A @ solution, rcond=_LEAST[space.dim])[0]
+    least_trace = space.geometry.least_trace
+    correction = np.linalg.lstsq(A / scale, target - A @ solution, rcond=least_trace)[0]
     is_free = np.isnan(values_there).any(axis=0)
     return unknowns, np.where(is_free, np.nan, solution + correction / scale[:, None])
 

@@ -7,9 +7,10 @@ from typing import Any
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import prolonged_cracks
 from xcrack.crack.stations import GEOMETRY
-from xcrack.fem import joints_2d, joints_3d
+from xcrack.fem import cut as cut_cells
+from xcrack.fem import enrichment, facets, joint_nodes, joints_2d, joints_3d
 from xcrack.fem.assembly import Bulk, Enriched, Stiffness, bulk, enriched_stiffness
-from xcrack.fem.cut import cut
+from xcrack.fem.cut import CellGeometry, cut
 from xcrack.fem.enrichment import front_reach
 from xcrack.fem.facets import LipPoints, jump_matrix, lip_points
 from xcrack.fem.function_space import FunctionSpace, function_space
@@ -98,18 +99,30 @@ def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
         for on in {junction.on for junction in junctions}:
             reach = front_reach(mesh, level_set_cracks[on], numerics.radius)
             level_sets[on] = with_far_sides(mesh, level_set_cracks[on], level_sets[on], reach)
-    cuts = tuple(cut(mesh, each) for each in level_sets)
+    geometry = CELLS[mesh.dim]
+    cuts = tuple(cut(mesh, each, geometry) for each in level_sets)
     joints: tuple[Joint, ...] = ()
     if junctions:
-        cuts, joints = _JOINED[mesh.dim](mesh, cuts, junctions)
-    space = function_space(mesh, problem.order or 1, cracks, cuts, numerics, joints)
+        cuts, joints = geometry.joined_cuts(mesh, cuts, junctions)
+    space = function_space(mesh, problem.order or 1, cracks, cuts, numerics, geometry, joints)
     if joints:
         jumps = jump_nodes(space)
-        space = function_space(mesh, space.order, cracks, cuts, numerics, joints, jumps)
+        space = function_space(mesh, space.order, cracks, cuts, numerics, geometry, joints, jumps)
     return space, tuple(lip_points(space, c) for c in range(len(cracks)))
 
 
-_JOINED = {2: joints_2d.joined_cuts, 3: joints_3d.joined_cuts}
+CELLS = {
+    2: CellGeometry(
+        cut_cells.tip_parts, cut_cells.lips_up_to_tips, enrichment.disc_radii,
+        facets.split_edges, facets.points_on_segments, facets.positions_along_line,
+        joints_2d.joined_cuts, joint_nodes.nodes_around_point, least_trace=1e-11,
+    ),
+    3: CellGeometry(
+        cut_cells.front_parts, cut_cells.lips_up_to_fronts, enrichment.front_radii,
+        facets.split_triangles, facets.points_on_triangles, facets.positions_on_surface,
+        joints_3d.joined_cuts, joint_nodes.nodes_along_line, least_trace=1e-3,
+    ),
+}  # fmt: skip
 
 
 def levels(mesh: Mesh, crack: Crack, numerics: Numerics) -> LevelSet:

@@ -9,10 +9,10 @@ from xcrack.base.arrays import Floats
 from xcrack.base.errors import XcrackError
 from xcrack.base.units import STRESS
 from xcrack.crack.measures import crack_areas
+from xcrack.crack.stations import GEOMETRY
 from xcrack.fatigue.checks import evaluate_law
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import PLACE
 from xcrack.growth.step import Step, place_name
 from xcrack.growth.validity import Validity, validity
 from xcrack.model.loads import Load
@@ -234,7 +234,7 @@ def _no_growth(rule: GrowthRule, step: Step, units: str) -> list[Alarm]:
     for factor in _REACH:
         dK = np.array([factor * largest])
         try:
-            rate = evaluate_law(rule.law, dK, R, 0, PLACE[mesh.dim], np.array([length]))
+            rate = evaluate_law(rule.law, dK, R, 0, GEOMETRY[mesh.dim].station, np.array([length]))
         except XcrackError:  # beyond what its constants were fitted for
             return []
         if rate[0] > 0 and dK[0] >= rule.threshold:

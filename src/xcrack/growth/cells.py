@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 
 from xcrack.adaptivity.indicators import Indicators, indicators_of
-from xcrack.adaptivity.resolved import resolved_problem
+from xcrack.adaptivity.resolved import resolved_tips
 from xcrack.adaptivity.sizes_2d import cell_ratios, tip_sizes
 from xcrack.adaptivity.sizes_3d import coarse_mesh
 from xcrack.base.errors import (
@@ -114,7 +114,7 @@ def follow(first_rule: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
 
 def _first_mesh_2d(problem: Problem, _: float) -> Mesh:
     """The mesh as it was given, where cracks are long enough in it; else finer at the tips."""
-    problem = resolved_problem(problem)
+    problem = resolved_tips(problem)
     place, size = tip_sizes(problem)
     if (cell_sizes(problem.mesh, place) <= _COARSEST * size).all():
         return problem.mesh

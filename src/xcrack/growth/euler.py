@@ -1,6 +1,7 @@
 """Growth of first order: each step goes on with the directions and rates at its beginning."""
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -34,14 +35,13 @@ from xcrack.mesh.locate import cell_sizes
 
 _SAME = 1e-6  # of the coordinates: a tip recognised after its advance
 _DRIVING = 0.5  # share of the largest rate from which on a point counts as driving
-_WAITS_BELOW = {2: LEAST, 3: fronts.WAITS_BELOW}
 
 
 def predict(rule: GrowthRule, step: Step) -> Plan:
     """The advance after a step."""
     stations, solves = solves_of(step)
-    mesh = rule.problem.mesh
-    cell = cell_sizes(mesh, stations.x)
+    ends = _ENDS[rule.problem.mesh.dim]
+    cell = cell_sizes(rule.problem.mesh, stations.x)
     rate = np.concatenate([np.zeros(0), *step.rate])
     fastest_rate = float(rate.max(initial=0.0))
     plan = Plan.at_rest(step, cell)
@@ -51,15 +51,14 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     largest = float(min(longest(rule, step.control), by_cycles))
     score = _score(rule, step)
     growth = stations.growth(score, largest)
-    is_growing = growth >= _WAITS_BELOW[mesh.dim] * cell
+    is_growing = growth >= ends.waits_below * cell
     way = np.where(is_growing, growth, 0.0)
-    find_interfaces = interfaces_ahead if mesh.dim == 2 else whole_front_ahead
-    interfaces = find_interfaces(rule, stations.x, way[:, None] * solves.direction[-1])
+    interfaces = ends.interfaces_ahead(rule, stations.x, way[:, None] * solves.direction[-1])
     if interfaces is not None and (way > interfaces.stop).any():  # a step ends before it, or behind
         is_beyond = way > interfaces.stop
         largest *= float((interfaces.goal[is_beyond] / way[is_beyond]).min())
         growth = stations.growth(score, largest)
-        is_growing = growth >= _WAITS_BELOW[mesh.dim] * cell
+        is_growing = growth >= ends.waits_below * cell
         way = np.where(is_growing, growth, 0.0)
     row = int(np.argmax(score))
     plan = replace(
@@ -77,17 +76,21 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
 
 def advanced_cracks(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     """The cracks after the advance of their stations."""
-    mesh = rule.problem.mesh
-    stations = solves_of(step)[0]
+    return _ENDS[rule.problem.mesh.dim].advanced_cracks(rule, step, way)
+
+
+def _advanced_surfaces(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
+    mesh, stations = rule.problem.mesh, solves_of(step)[0]
     angle = np.concatenate([np.zeros(0), *step.angle])
-    if mesh.dim == 3:
-        return place_arms(
-            [
-                advanced_crack(crack, stations, c, angle, way, mesh)
-                for c, crack in enumerate(step.cracks)
-            ],
-            mesh,
-        )
+    cracks = [
+        advanced_crack(one, stations, c, angle, way, mesh) for c, one in enumerate(step.cracks)
+    ]
+    return place_arms(cracks, mesh)
+
+
+def _advanced_lines(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
+    mesh, stations = rule.problem.mesh, solves_of(step)[0]
+    angle = np.concatenate([np.zeros(0), *step.angle])
     rows = [stations.crack == c for c in range(len(step.cracks))]
     cracks = [advance(crack, angle[r], way[r]) for crack, r in zip(step.cracks, rows, strict=True)]
     if rule.link_up is not None:
@@ -132,8 +135,7 @@ def begin_at(
 
 def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """What the cracks after an advance mean for the cycles and for the next advance."""
-    follow = _followed_2d if rates.problem.mesh.dim == 2 else _followed_3d
-    since, growth_owed = follow(rule, last, rates)
+    since, growth_owed = _ENDS[rates.problem.mesh.dim].growth_since(rule, last, rates)
     return _step_of_solve(rule, rates, identities, last.cycles + since, growth_owed)
 
 
@@ -316,6 +318,24 @@ def elapsed_3d(
     x, y = np.log(size1[c] / size0[c]), np.log(ratio)
     return by_first_rate * float(exprel(x - y) / exprel(x))
 
+
+@dataclass(frozen=True)
+class _Ends:
+    """What tips and fronts do in ways of their own.
+
+    `waits_below` in cells; `growth_since` the last step: cycles, and growth that waits.
+    """
+
+    waits_below: float
+    interfaces_ahead: Callable[[GrowthRule, Floats, Floats], InterfacesAhead | None]
+    advanced_cracks: Callable[[GrowthRule, Step, Floats], list[Crack]]
+    growth_since: Callable[[GrowthRule, Step, Rates], tuple[float, Floats]]
+
+
+_ENDS = {
+    2: _Ends(LEAST, interfaces_ahead, _advanced_lines, _followed_2d),
+    3: _Ends(fronts.WAITS_BELOW, whole_front_ahead, _advanced_surfaces, _followed_3d),
+}
 
 __all__ = [
     "advance_of",

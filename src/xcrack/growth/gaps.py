@@ -5,9 +5,9 @@ from scipy.special import ellipe, ellipk
 
 from xcrack.base.arrays import Floats
 
-# Of what cycles differ by from those at the last rate: what is unsure of them. In 2D of cracks of
-# which one is up to five times as long as the other.
-UNKNOWN = {2: 0.1, 3: 0.25}
+# Of what cycles differ by from those at the last rate: what is unsure of them. Tips are those of
+# cracks of which one is up to five times as long as the other.
+UNKNOWN_OF_TIPS, UNKNOWN_OF_FRONTS = 0.1, 0.25
 
 _A, _P, _B, _Q = 0.0977222, 0.575392, 3.22635, 1.32721  # fitted to 0.2 % from x = 0.03 to 4
 _POINTS = 48
@@ -57,4 +57,4 @@ def part_of_time(x: float, exponent: float, dim: int = 3) -> float:
     return float((weight / 2 * 2 * u * ratio).sum())
 
 
-__all__ = ["UNKNOWN", "amplification", "part_of_time"]
+__all__ = ["UNKNOWN_OF_FRONTS", "UNKNOWN_OF_TIPS", "amplification", "part_of_time"]

@@ -40,7 +40,7 @@ from xcrack.crack.placing_3d import meeting_points, place_arm, place_arms
 from xcrack.fem.system import discretise
 from xcrack.growth import euler, fronts
 from xcrack.growth.fronts import interpolate_along_front
-from xcrack.growth.gaps import UNKNOWN, part_of_time
+from xcrack.growth.gaps import UNKNOWN_OF_FRONTS, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
@@ -160,7 +160,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         time_at_first_rate = max(time_at_first_rate, way_of_area)
         gain = max(gain, _gain_of((area_apart.sum() + led_on) / total, m))
     cycles = time * plan.cycles / gain
-    cycle_error = UNKNOWN[3] * abs(time_at_first_rate * plan.cycles - cycles)
+    cycle_error = UNKNOWN_OF_FRONTS * abs(time_at_first_rate * plan.cycles - cycles)
     joins_of_step = [
         Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), pair)
         for pair, x in joined_now.places
@@ -286,7 +286,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
     cycles = time * plan.cycles
     join = Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), (c, c))
     return replace(
-        plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN[3] * cycles,
+        plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN_OF_FRONTS * cycles,
         cracks=tuple(cracks_now),
         apart=tuple(cracks_apart), joins=(join,), limit="", refusal="",
     )  # fmt: skip

@@ -12,8 +12,8 @@ from typing import Any
 
 from xcrack.base.errors import XcrackWarning, collected_warnings, warn
 from xcrack.base.optional import in_notebook
+from xcrack.crack.stations import GEOMETRY
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import PLACE
 from xcrack.growth.step import Step
 
 _LOG = logging.getLogger("xcrack")
@@ -69,7 +69,7 @@ class Progress:
 
 
 def _line(run: GrowthRule, step: Step) -> str:
-    places = f"{PLACE[run.problem.mesh.dim]}s"
+    places = f"{GEOMETRY[run.problem.mesh.dim].station}s"
     return (
         f"step {step.index:4d}  N {step.cycles:12.6g}  largest dK_eq "
         f"{_largest_part(step.dK_eq):10.5g}  "

@@ -10,7 +10,7 @@ from xcrack.analysis.solution import mean_stress
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import ProblemError, warn
 from xcrack.crack.crack import Crack
-from xcrack.crack.stations import Stations
+from xcrack.crack.stations import GEOMETRY, Stations
 from xcrack.fatigue.checks import evaluate_criterion, evaluate_law, law_exponent
 from xcrack.fatigue.criteria import clipped_K, kink_angle, local_equivalent_K, nominal_range
 from xcrack.fatigue.law import Law, LawSets, Names
@@ -23,8 +23,6 @@ from xcrack.growth.stations import PerCrack, directions, solved_stations, split
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import at_stations
-
-PLACE = {2: "tip", 3: "front place"}  # what a station is called in messages
 
 _ROUND_OFF = 1e-5  # range over the largest K_eq below which it is the error of a stuck crack
 _LEFT_OUT = 1e-3  # share of the growth of a block
@@ -261,7 +259,7 @@ def _inputs_of_cycle(
     free_response: Response | None,
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
-    place = PLACE[problem.mesh.dim]
+    place = GEOMETRY[problem.mesh.dim].station
 
     def of_crack(c: int) -> CriterionInput:
         nu = problem.elasticity.poisson_at(response.sif[0][c].x)
@@ -295,7 +293,7 @@ def _inputs_of_blocks(
     free_response: Response | None,
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
-    place = PLACE[problem.mesh.dim]
+    place = GEOMETRY[problem.mesh.dim].station
     every = pairs_of(rule, problem, response)
     nominal_pairs = (
         [None] * len(every) if free_response is None else pairs_of(rule, problem, free_response)
@@ -611,7 +609,7 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
     if rule.retardation is None:
         return None
     problem = rates.problem
-    place, parts = PLACE[problem.mesh.dim], []
+    place, parts = GEOMETRY[problem.mesh.dim].station, []
     for c, pairs in enumerate(pairs_of(rule, problem, rates.response)):
         a = law_size(problem.mesh.dim, problem.sizes[c], pairs.K.shape[2])
         x = rates.response.sif[0][c].x
@@ -627,7 +625,6 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
 
 
 __all__ = [
-    "PLACE",
     "CriterionInput",
     "CycleRates",
     "PairRates",

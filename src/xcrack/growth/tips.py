@@ -28,7 +28,7 @@ from xcrack.crack.placing_2d import MOUTH
 from xcrack.fatigue.criteria import START, clipped_K, kinked_K, limit_angles
 from xcrack.fatigue.retardation import BlockCycles, no_zones
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.gaps import UNKNOWN, part_of_time
+from xcrack.growth.gaps import UNKNOWN_OF_TIPS, part_of_time
 from xcrack.growth.interfaces import (
     InterfacesAhead,
     cycles_of_jump,
@@ -295,7 +295,7 @@ def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> t
         cycles_at_first_rate = gap / speed
         cycles = cycles_at_first_rate * part_of_time(2 * gap / float(radius[i] + radius[k]), m, 2)
         if cycles < best[0]:
-            best = cycles, UNKNOWN[2] * (cycles_at_first_rate - cycles)
+            best = cycles, UNKNOWN_OF_TIPS * (cycles_at_first_rate - cycles)
     cycles, cycle_error = best
     share = cycles / growth.cycles if growth.cycles > 0 else 1.0
     is_meeting = np.isin(

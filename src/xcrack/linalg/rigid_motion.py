@@ -11,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.errors import ProblemError
 from xcrack.fem.assembly import rigid_modes
-from xcrack.fem.facets import split_facets
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import at_joints, n_parts, part_numbers, sub_cells
 from xcrack.mesh.locate import barycentric
@@ -185,7 +184,7 @@ def _neighbours(space: FunctionSpace) -> tuple[Ints, Ints]:
     """Parts of cells that share a part of a facet on which no crack lies, by their numbers."""
     mesh = space.mesh
     inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
-    parts = split_facets(space, mesh.facets[inner])
+    parts = space.geometry.split_facets(space, mesh.facets[inner])
     facet = inner[parts.number]
     is_apart = np.zeros(len(facet), dtype=bool)
     for c, cut in enumerate(space.cuts):

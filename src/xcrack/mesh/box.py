@@ -13,10 +13,7 @@ from xcrack.base.errors import MeshError
 from xcrack.mesh.mesh import Mesh, sound_mesh
 
 _MOST_CELLS = 1e8  # more do not fit into the memory of any machine that solves them
-_SIDES = {
-    2: [("left", "right"), ("bottom", "top")],
-    3: [("left", "right"), ("front", "back"), ("bottom", "top")],
-}
+_SIDES = [("left", "right"), ("front", "back"), ("bottom", "top")]  # of the first, inner, last axis
 
 
 @check_arguments(MeshError)
@@ -87,7 +84,7 @@ def box(
         turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
     cells[turn] = cells[turn][:, [1, 0, *range(2, d + 1)]]
     sets = {}
-    for axis, both in enumerate(_SIDES[d]):
+    for axis, both in enumerate((_SIDES[0], *_SIDES[1 : d - 1], _SIDES[-1])):
         for name, end in zip(both, (0, count[axis]), strict=True):
             sets[name] = _facets_on(cells, index[axis] == end)
     return sound_mesh(points, cells, sets)

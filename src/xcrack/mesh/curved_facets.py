@@ -9,6 +9,7 @@ parabola over 60° is .2 % of the radius off.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -26,13 +27,6 @@ _ROOMY = 1.1  # times the distance of the farthest node: pieces bulge between th
 _STRAIGHT = 1e-9  # of an edge: middle of an arc this close to its chord
 _NAME = "curved_{}"
 _INNER = np.array([(0, 1, 2), (1, 0, 2), (2, 0, 1)])  # corners by weight of the inner nodes
-_LATTICE = {  # four times the barycentric coordinates of the nodes of a piece, by its corners
-    2: np.array([(4, 0), (0, 4), (3, 1), (2, 2), (1, 3)]),
-    3: np.array([
-        (4, 0, 0), (0, 4, 0), (0, 0, 4), (3, 1, 0), (2, 2, 0), (1, 3, 0), (3, 0, 1), (2, 0, 2),
-        (1, 0, 3), (0, 3, 1), (0, 2, 2), (0, 1, 3), (2, 1, 1), (1, 2, 1), (1, 1, 2),
-    ]),
-}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +158,17 @@ def lattice(points: Floats, facets: Ints) -> Lattice:
         nodes.append(inner)
     every = np.concatenate(nodes, axis=1)
     x = np.empty((int(every.max(initial=-1)) + 1, points.shape[1]))
-    x[every] = np.einsum("ac,kcd->kad", _LATTICE[d] / 4, points[facets])
+    x[every] = np.einsum("ac,kcd->kad", _lattice_places(d), points[facets])
     return Lattice(x, every, corner, edges)
+
+
+def _lattice_places(n: int) -> Floats:
+    """Barycentric coordinates of the nodes of a piece of n corners: there, on edges, inside."""
+    corner = np.eye(n)
+    edges = [(k * corner[a] + (4 - k) * corner[b]) / 4
+             for a, b in combinations(range(n), 2) for k in (3, 2, 1)]  # fmt: skip
+    inner = [(corner + 1) / 4 for _ in combinations(range(n), 3)]
+    return np.vstack([corner, *edges, *inner])
 
 
 def arcs(a: Floats, middle: Floats, b: Floats) -> Floats:

@@ -22,7 +22,7 @@ from xcrack.model.material import Graded, Isotropic, Material
 _PROPERTIES = ("ELASTIC", "EXPANSION", "DENSITY", "PLASTIC")
 _EQUAL = 1e-9  # relative: values this close are one
 # Edges of a cell in the order of Field, by the ends.
-_EDGES = {2: ((0, 1), (1, 2), (2, 0)), 3: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))}
+_EDGES = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
 
 
 def _zero(x: Floats) -> Floats:
@@ -344,7 +344,7 @@ class DeckBody:
         every[mesh.n_points :] = np.where(
             self.is_bare[mesh.n_points :], ends, every[mesh.n_points :]
         )
-        pairs = np.array(_EDGES[self.dim])
+        pairs = _EDGES[_EDGES.max(axis=1) <= self.dim]
         corners = mesh.cells[:, pairs].reshape(-1, 2)
         middles = self._edge_numbers(corners).reshape(len(mesh.cells), -1)
         nodes = np.concatenate([mesh.cells, middles], axis=1)

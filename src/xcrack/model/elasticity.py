@@ -9,6 +9,7 @@ functions, which come from other points, would else not make a positive matrix.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -387,15 +388,14 @@ def _projection(dim: int) -> Floats:
     return lock((dim + 1) * ((dim + 2) * moments - moments.sum(axis=0)))
 
 
-_ROWS = {2: [(0, 0), (1, 1), (0, 1)], 3: [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]}
-
-
 def _voigt(tensor: Floats, frame: Floats) -> Floats:
     """Stiffness `(v, v)` along the rows of a frame, of a tensor `(d, d, d, d)`."""
     rotated = tensor
     if isotropic_part(tensor)[2] is not None:
         rotated = np.einsum("ai,bj,ck,dl,ijkl->abcd", frame, frame, frame, frame, tensor)
-    i, j = np.array(_ROWS[len(tensor)]).T
+    d = len(tensor)
+    shear = sorted(combinations(range(d), 2), reverse=True)
+    i, j = np.array([*((k, k) for k in range(d)), *shear]).T
     return rotated[i[:, None], j[:, None], i, j]
 
 

@@ -16,12 +16,6 @@ from xcrack.model.values import ScalarField, scalar_at
 
 _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])  # rows of stiffness by component
 _ROUND_OFF = 1e-12  # of the largest entry of a stiffness
-_WRONG_PLANE = {
-    2: 'a 2D body needs {}(..., plane="strain") or plane="stress": the two differ by up to '
-    "1/(1 - nu²) in stiffness, so there is no default.",
-    3: '{}(plane="{}") is for 2D bodies: leave plane out for a mesh of tetrahedra '
-    "(read_mesh drops a constant z).",
-}
 _THICK = 2.5  # (K / yield stress)² from which a thickness is plane strain
 _PLANES = ("strain", "stress")
 _JUDGES = {"changes_results": False}  # what results are judged by, not what they are
@@ -139,8 +133,16 @@ class Material(Declared):
             )
 
     def _check_plane(self, dim: int) -> None:
-        if (self.plane is None) is (dim == 2):
-            raise ProblemError(_WRONG_PLANE[dim].format(self.kind, self.plane))
+        if self.plane is None and dim == 2:
+            raise ProblemError(
+                f'a 2D body needs {self.kind}(..., plane="strain") or plane="stress": the two '
+                "differ by up to 1/(1 - nu²) in stiffness, so there is no default."
+            )
+        if self.plane is not None and dim == 3:
+            raise ProblemError(
+                f'{self.kind}(plane="{self.plane}") is for 2D bodies: leave plane out for a mesh '
+                "of tetrahedra (read_mesh drops a constant z)."
+            )
 
     def _check_fields(self) -> None:
         if self.plane not in (None, *_PLANES):

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, cast
@@ -37,7 +38,6 @@ from xcrack.view.scene_3d import LIP_FIELDS, clip_plane
 from xcrack.view.section_3d import Plane
 
 _GRAPHS = ("pressure", "opening")
-_KNOWN = {2: (*FIELDS, "mesh", *_GRAPHS), 3: (*SPACE_FIELDS, "mesh", *LIP_FIELDS)}
 _ON_LIPS = {*_GRAPHS, *LIP_FIELDS}
 _DRAWABLE = 'a Solution, or a Problem with field="mesh"'
 _NO_OPENGL = "it cannot draw here (no OpenGL): apt-get install libegl1 libgl1-mesa-dri"
@@ -132,7 +132,8 @@ def plot(
         The renderer that was asked for is not installed.
     """
     solution = _solution_to_draw(solution, field)
-    Choice(_KNOWN[solution.space.dim]).check(field, "plot: field", ProblemError)
+    dimension = _PICTURES[solution.space.dim]
+    Choice(dimension.fields).check(field, "plot: field", ProblemError)
     look = PlotStyle(
         warp=warp,
         title=title,
@@ -151,8 +152,7 @@ def plot(
         raise ProblemError(f'plot(field="{field}"): the body has no crack; draw another field.')
     target = picture_path(file, "plot")
     window = (target is None and _has_display()) if show is None else show
-    draw = {2: _draw_2d, 3: _draw_3d}[solution.space.dim]
-    return draw(solution, field, target, window, renderer, look)
+    return dimension.draw(solution, field, target, window, renderer, look)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,6 +265,20 @@ def _draw_3d(
     edges = look.edges or field == "mesh"
     colours = look.colours(picture.has_sign)
     return draw_space(picture, arrows, target, window, look.title, edges, colours)
+
+
+@dataclass(frozen=True)
+class _Pictures:
+    """Fields that there are pictures of, and what draws them."""
+
+    fields: tuple[str, ...]
+    draw: Callable[..., Any]
+
+
+_PICTURES = {
+    2: _Pictures((*FIELDS, "mesh", *_GRAPHS), _draw_2d),
+    3: _Pictures((*SPACE_FIELDS, "mesh", *LIP_FIELDS), _draw_3d),
+}
 
 
 def crack_box(solution: Solution, cracks: list[int], zoom: float, warp: float = 0.0) -> Floats:

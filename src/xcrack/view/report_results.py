@@ -12,6 +12,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import coordinates
 from xcrack.base.markup import Markup, element, join_parts, table
 from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, NUMBER, STRESS, TOUGHNESS
+from xcrack.crack.stations import GEOMETRY
 from xcrack.fatigue.retardation import OverloadZones
 from xcrack.growth.step import Step
 from xcrack.sif.sif import SIF
@@ -20,7 +21,6 @@ from xcrack.view.report_pictures import drawn_figure
 from xcrack.view.report_source import Section, Source, UnitNames, setting_words
 
 _MODES = ("K_I", "K_II", "K_III")
-_END = {2: "tip", 3: "front"}
 
 
 def intensity(source: Source) -> Section | None:
@@ -37,7 +37,7 @@ def intensity(source: Source) -> Section | None:
                 rows.append((k, c, int(tip), *row))
                 numbers.append({"state": k, "crack": c, "tip": int(tip),
                                 **dict(zip(head, map(_json_value, row), strict=True))})  # fmt: skip
-    first = ("state", "crack", _END[source.dim])
+    first = ("state", "crack", GEOMETRY[source.dim].end)
     note = ("spread: difference between two domains of the integral; domain: radius of the larger "
             "one, in cells. K_I of closed places is exactly zero. best ± bar: estimate of exact K "
             "and half-width of its error, left out where there is none.")  # fmt: skip

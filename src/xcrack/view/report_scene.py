@@ -14,6 +14,7 @@ from xcrack.base.markup import Markup, display_text, element, join_parts, list_m
 from xcrack.base.units import FORCE, LENGTH, LINE_FORCE, MOMENT, NUMBER, Dimension
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import Measures, measures
+from xcrack.crack.stations import GEOMETRY
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 from xcrack.model.supports import Condition
@@ -48,7 +49,7 @@ def scene(source: Source) -> Section:
     parts: list[Any] = [table((), rows)]
     crack_measures = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
     if crack_measures:
-        size = {2: "length", 3: "area"}[source.dim]
+        size = GEOMETRY[source.dim].size
         area = LENGTH if source.dim == 2 else (2.0, 0.0)
         head = ("crack", source.units.head(size, area), source.units.head("depth", LENGTH),
                 "on the surfaces", "ends")  # fmt: skip
