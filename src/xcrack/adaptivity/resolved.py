@@ -150,15 +150,15 @@ def resolved_tips(problem: Problem) -> Problem:
     CoarseMeshError
         No mesh will do: the message of the last one.
     """
-    return _resolved(problem, _hidden_tips, _sizes_at_lines)
+    return _resolved_problem(problem, _hidden_tips, _sizes_at_lines)
 
 
 def resolved_fronts(problem: Problem) -> Problem:
     """The scene on a mesh that is fine enough to tell fronts from mouths, as `resolved_tips`."""
-    return _resolved(problem, _hidden_fronts, _sizes_at_outlines)
+    return _resolved_problem(problem, _hidden_fronts, _sizes_at_outlines)
 
 
-def _resolved(
+def _resolved_problem(
     problem: Problem,
     hidden_ends: Callable[[Problem], bool],
     edge_lengths: Callable[[Problem, int], Callable[[Floats], Floats]],
