@@ -7,8 +7,24 @@ import numpy as np
 import pytest
 
 from support.growth_fakes import formula, mode_I, plate
-from xcrack import Cycle, XcrackWarning, grow, max_hoop_stress, paris
-from xcrack.base.errors import warn
+from xcrack import (
+    Cycle,
+    Isotropic,
+    Problem,
+    XcrackWarning,
+    box,
+    grow,
+    line_crack,
+    max_hoop_stress,
+    paris,
+)
+
+BODY, STEEL = box((-0.5, -0.5), (0.5, 0.5), 16), Isotropic(1.0, 0.3, plane="strain")
+
+
+def warn(x=0.47):
+    """Of an end close to the boundary, that is taken as a mouth."""
+    Problem(BODY, STEEL, [line_crack([(-0.3, 0.01), (0.3, 0.01), (x, 0.02)])])
 
 
 def inner(function):
@@ -16,6 +32,10 @@ def inner(function):
     names = {"__name__": "xcrack.some.module", "function": function}
     exec("def call(*rest):\n    return function(*rest)", names)
     return names["call"]
+
+
+def warn_of_a_kink():
+    Problem(BODY, STEEL, [line_crack([(-0.3, 0.01), (0.01, 0.6), (0.3, 0.01)])])
 
 
 def line_of_warning(call):
@@ -30,19 +50,20 @@ def line_of_warning(call):
 def test_at_once_and_through_layers():
     layered = inner(inner(inner(lambda: None)))
     assert layered() is None
-    assert line_of_warning(lambda: warn("mind")) == __file__
-    assert line_of_warning(inner(warn_of("mind"))) == __file__
+    assert line_of_warning(warn) == __file__
+    assert line_of_warning(inner(deep_warning())) == __file__
 
 
-def warn_of(message):
-    """`warn` called from a frame of xcrack."""
-    names = {"__name__": "xcrack.deep", "warn": warn}
-    exec(f"def call():\n    warn({message!r})", names)
+def deep_warning():
+    """A warning of a call that stands in a frame of xcrack."""
+    names = {"__name__": "xcrack.deep", "Problem": Problem, "body": BODY, "steel": STEEL}
+    names["crack"] = line_crack([(-0.3, 0.01), (0.3, 0.01), (0.47, 0.02)])
+    exec("def call():\n    Problem(body, steel, [crack])", names)
     return names["call"]
 
 
 def test_through_numpy_and_functools():
-    deep = functools.partial(inner(lambda x: warn_of("mind")() or x), 1.0)
+    deep = functools.partial(inner(lambda x: deep_warning()() or x), 1.0)
     assert (
         line_of_warning(lambda: np.vectorize(lambda x: deep() * x, otypes=[float])(np.ones(1)))
         == __file__
@@ -51,8 +72,8 @@ def test_through_numpy_and_functools():
 
 def test_a_stack_of_nothing_but_xcrack(monkeypatch):
     monkeypatch.setattr("xcrack.base.errors._INSIDE", frozenset(_names()))
-    with pytest.warns(XcrackWarning, match="mind"):
-        warn("mind")
+    with pytest.warns(XcrackWarning, match="taken as a mouth"):
+        warn()
 
 
 def _names():
@@ -72,9 +93,9 @@ def test_a_repeated_warning_is_summarised_once(stop):
 
     def response(problem, *rest):
         a = float(problem.placed[0].points[-1, 0])
-        warn(f"K at [{a}, 0.37]: the domain is clipped to {1 / a:.4g} (2.3 cells)")
+        warn(0.47 + a / 10_000)
         if a > 12:
-            warn("a crack is long")
+            warn_of_a_kink()
         return whole(problem, *rest)
 
     with warnings.catch_warnings(record=True) as caught:
@@ -87,9 +108,9 @@ def test_a_repeated_warning_is_summarised_once(stop):
         steps.close()
     texts = [str(w.message) for w in caught]
     assert all(w.filename == __file__ for w in caught)
-    assert texts[0].startswith("K at [5.0, 0.37]: the domain is clipped to 0.2 ")
-    assert texts[1:-1] == ([] if stop else ["a crack is long"])
+    assert "ends at [0.4705, 0.02], 0.0295 inside the boundary" in texts[0]
+    assert ["by its kink" in text for text in texts[1:-1]] == ([] if stop else [True])
     n = 4 if stop else 6
     assert f"in {n} of {n} steps, from step 0 to {n - 1}" in texts[-1]
-    assert f"K at [{5.0 + 2 * (n - 1)}, 0.37]" in texts[-1]  # the last of them in full
-    assert ("a crack is long" in texts[-1]) == (stop is None)
+    assert f"ends at [{round(0.4705 + 0.0002 * (n - 1), 4)}, 0.02]" in texts[-1]  # the last in full
+    assert ("by its kink" in texts[-1]) == (stop is None)
