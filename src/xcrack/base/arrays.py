@@ -77,3 +77,21 @@ def offsets(counts: Ints) -> Ints:
     result = np.zeros(len(counts) + 1, dtype=np.int64)
     np.add.accumulate(counts, out=result[1:])
     return result
+
+
+def runs_of(flag: Bools) -> list[Ints]:
+    """Cyclic runs of true values, each as its places in order."""
+    if flag.all():
+        return [np.arange(len(flag))]
+    start = np.nonzero(flag & ~np.roll(flag, 1))[0]
+    result = []
+    for first in start:
+        place = (first + np.arange(len(flag))) % len(flag)
+        result.append(place[: int(np.argmin(flag[place]))])
+    return result
+
+
+def open_runs(flag: Bools) -> list[Ints]:
+    """Runs of true values that do not go round, each as its places in order."""
+    places = np.nonzero(flag)[0]
+    return [run for run in np.split(places, np.nonzero(np.diff(places) > 1)[0] + 1) if len(run)]

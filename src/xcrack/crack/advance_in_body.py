@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.crack.boundary_trace import is_enclosed, open_runs, runs_of, way_to_middle
+from xcrack.base.arrays import Bools, Floats, Ints, open_runs, runs_of
+from xcrack.crack.boundary_trace import is_enclosed, way_to_middle
 from xcrack.crack.front_chain import FrontChain, chain
 from xcrack.crack.front_curve import front_curve
 from xcrack.crack.fronts import Front
@@ -55,7 +55,8 @@ def has_way_to_hole(rays_of_fronts: Sequence[Rays | None], body: Body) -> bool:
         x = front.start[:, None] + share[:, None] * move[:, None]
         is_outside = ~body.contains(x.reshape(-1, 3)).reshape(len(move), -1)
         rows = np.nonzero(is_outside.any(axis=1) & body.contains(front.start))[0]
-        if is_enclosed(x[rows, np.argmax(is_outside[rows], axis=1)], normal[rows], body).any():
+        leaving_points = x[rows, np.argmax(is_outside[rows], axis=1)]
+        if len(rows) and is_enclosed(leaving_points, normal[rows], body).any():
             return True
     return False
 

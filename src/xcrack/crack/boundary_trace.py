@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats, Ints, open_runs, runs_of
 from xcrack.base.errors import CoarseMeshError
 from xcrack.mesh.distances import first_crossing
 from xcrack.mesh.locate import ON, Body
@@ -494,21 +494,3 @@ def _check_nick(x: Floats, way: Floats, depth: Floats, size: Floats, body: Body)
             f"the boundary that it comes from, which is less than half a cell "
             f"({size[nicks[0]]:.4g}): refine the mesh there, or leave this part of the crack out."
         )
-
-
-def runs_of(flag: Bools) -> list[Ints]:
-    """Cyclic runs of true values, each as its places in order."""
-    if flag.all():
-        return [np.arange(len(flag))]
-    start = np.nonzero(flag & ~np.roll(flag, 1))[0]
-    result = []
-    for first in start:
-        place = (first + np.arange(len(flag))) % len(flag)
-        result.append(place[: int(np.argmin(flag[place]))])
-    return result
-
-
-def open_runs(flag: Bools) -> list[Ints]:
-    """Runs of true values that do not go round, each as its places in order."""
-    places = np.nonzero(flag)[0]
-    return [run for run in np.split(places, np.nonzero(np.diff(places) > 1)[0] + 1) if len(run)]

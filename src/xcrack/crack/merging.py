@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Bools, Floats, Ints, at
+from xcrack.base.arrays import Bools, Floats, Ints, at, open_runs, runs_of
 from xcrack.base.errors import GeometryError
-from xcrack.crack.boundary_trace import is_at_hole, is_enclosed, open_runs, runs_of
+from xcrack.crack.boundary_trace import is_at_hole, is_enclosed
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import Front, front_frames
 from xcrack.mesh.distances import TriangleTree, closest_in, front_distance, triangle_tree

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import Delaunay, cKDTree
 
-from xcrack.base.arrays import Bools, Floats, Ints, at
+from xcrack.base.arrays import Bools, Floats, Ints, at, runs_of
 from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.boundary_trace import (
     OUTSIDE,
@@ -16,7 +16,6 @@ from xcrack.crack.boundary_trace import (
     TraceOutline,
     behind_holes,
     open_fronts,
-    runs_of,
     under_holes,
 )
 from xcrack.crack.crack import Crack

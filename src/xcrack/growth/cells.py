@@ -429,7 +429,7 @@ def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
     resumed does the same.
     """
     error, index = last.error, last.index + 1
-    if not rule.estimates or error is None or rule.problem.mesh.dim == 3:
+    if error is None or rule.problem.mesh.dim == 3:
         return False
     if index < _FIRST or index % _MEASURED == 0 or run_state(last).meshes != rule.meshes:
         return False

@@ -18,10 +18,9 @@ from xcrack.fatigue.law import LawSets
 from xcrack.fatigue.retardation import BlockCycles, OverloadZones, RetardationSets
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import rates_by_law_of
-from xcrack.growth.response import Response
+from xcrack.growth.response import Response, best_K
 from xcrack.growth.solves import Growth, SolveHistory, Stretch, bisected_length, stretch_of
 from xcrack.growth.step import Step, plan_of, solves_of
-from xcrack.growth.uncertainty import best_K
 from xcrack.mesh.locate import cell_sizes
 from xcrack.model.elasticity import Elasticity
 from xcrack.model.material import Isotropic

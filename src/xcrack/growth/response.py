@@ -24,6 +24,16 @@ from xcrack.sif.stress_intensity import stress_intensities
 Answers = tuple[tuple[SIF, ...], ...]
 
 
+def best_K(sif: Answers) -> Answers:
+    """K of all states and cracks, replaced by the best one wherever that is known."""
+    return tuple(tuple(_best_of_crack(crack) for crack in state) for state in sif)
+
+
+def _best_of_crack(sif: SIF) -> SIF:
+    has_best = sif.has_best
+    return replace(sif, K=np.where(has_best[:, None], sif.best, sif.K)) if has_best.any() else sif
+
+
 @dataclass(frozen=True, eq=False)
 class Response:
     """K of all cracks in some load states.
@@ -236,4 +246,4 @@ def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> 
     return response
 
 
-__all__ = ["Answers", "Respond", "Response", "checked_response", "respond"]
+__all__ = ["Answers", "Respond", "Response", "best_K", "checked_response", "respond"]

@@ -51,7 +51,7 @@ from xcrack.growth.levels import (
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
 from xcrack.growth.progress import Progress, WarningLog
 from xcrack.growth.rates import check_choice, rates_of, warn_of_left_out
-from xcrack.growth.response import Response
+from xcrack.growth.response import Response, best_K
 from xcrack.growth.stations import Identities, first_identities, identities_after, split
 from xcrack.growth.step import (
     Join,
@@ -62,7 +62,7 @@ from xcrack.growth.step import (
     run_state,
     solves_of,
 )
-from xcrack.growth.uncertainty import add_K_error, best_K, foretold_bars, shortfall
+from xcrack.growth.uncertainty import add_K_error, foretold_bars, shortfall
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem, problem_with_cracks
 from xcrack.sif.sif import SIF
@@ -539,7 +539,8 @@ def _solved_step(
     With `may_foretell`, bars of K may be those of the last solve, a little wider.
     """
     is_foretold = False
-    if may_foretell and last is not None and not joins_of_step and bars_are_foretold(rule, last):
+    may_foretell = may_foretell and rule.estimates and not joins_of_step
+    if may_foretell and last is not None and bars_are_foretold(rule, last):
         if rule.max_steps is not None and last.index + 2 >= rule.max_steps:
             # The last step has bars of its own; of a run that goes on it is one among others.
             step, handed_on = _solved_step(
@@ -579,7 +580,8 @@ def _solved_step(
             sif, solutions = response.sif, response.solutions
             rates = rates_of(rule, problem, sound_copy(response, sif=best_K(sif)))
             result = correct(rule, last, rates, identities)
-    result = add_K_error(rule, last, result, rates, sif, is_foretold)
+    if rule.estimates:
+        result = add_K_error(rule, last, result, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
     step = sound(
         Step,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xcrack.base.arrays import Bools, Floats
+from xcrack.base.arrays import Floats
 from xcrack.base.errors import collected_warnings
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthRule
@@ -28,23 +28,6 @@ _REMEDY = {
     "no bar": "The steps at which K has no error bar count in full.",
 }
 _WHOLE = 1.0  # relative error of a rate that may as well be zero, or infinite
-
-
-def best_K(sif: Answers) -> Answers:
-    """K of all states and cracks, replaced by the best one wherever that is known."""
-    return tuple(tuple(_best_K(crack) for crack in state) for state in sif)
-
-
-def uses_best(sif: SIF) -> Bools:
-    """Places whose growth follows the best K, not K `(f,)`."""
-    if sif.errors is None:
-        return np.zeros(len(sif.K), dtype=bool)
-    return np.asarray(np.isfinite(sif.best).all(axis=1))
-
-
-def _best_K(sif: SIF) -> SIF:
-    is_known = uses_best(sif)
-    return replace(sif, K=np.where(is_known[:, None], sif.best, sif.K)) if is_known.any() else sif
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +139,7 @@ def add_K_error(
     is_foretold: bool = False,
 ) -> Corrected:
     """A settled step whose error also has what the bars of K have cost so far."""
-    if not rule.estimates or corrected_step.error is None:
+    if corrected_step.error is None:
         return corrected_step
     if is_foretold and last is not None and last.error is not None:  # in proportion to the bars
         old_error = last.error
@@ -323,9 +306,7 @@ __all__ = [
     "TOGETHER",
     "RateError",
     "add_K_error",
-    "best_K",
     "foretold_bars",
     "rate_error",
     "shortfall",
-    "uses_best",
 ]

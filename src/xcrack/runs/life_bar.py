@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import uses_best
 
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
@@ -80,7 +79,7 @@ def life_bar(steps: Sequence[Step]) -> LifeBar:
     nan = float("nan")
     every = [sif for step in steps for sif in (step.sif[0] if step.sif else ())]
     states = [state for step in steps for state in zip(*step.sif)]
-    best_flags = [np.all([uses_best(sif) for sif in crack], axis=0) for crack in states]
+    best_flags = [np.all([sif.has_best for sif in crack], axis=0) for crack in states]
     best = sum(int(np.count_nonzero(flags_of_crack)) for flags_of_crack in best_flags)
     places = sum(len(sif.K) for sif in every)
     texts = [

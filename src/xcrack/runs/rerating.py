@@ -18,8 +18,8 @@ from xcrack.fatigue.load_program import Curve, K_over_size, LoadProgram, load_ov
 from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.levels import LevelTable
 from xcrack.growth.rates import pairs_of_states
+from xcrack.growth.response import best_K
 from xcrack.growth.step import Step, moved_places, numbers_after
-from xcrack.growth.uncertainty import best_K
 
 # Ranges and ratios of all cycles of a spectrum, from K at the levels that a step has stored.
 

@@ -22,8 +22,8 @@ from xcrack.fatigue.retardation import (
 )
 from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.levels import LevelTable
+from xcrack.growth.response import best_K
 from xcrack.growth.step import Step
-from xcrack.growth.uncertainty import best_K
 from xcrack.runs.history import History
 from xcrack.runs.rerating import DrivingForce, SpectrumBlock, driving_forces
 from xcrack.runs.scatter import Samples, stretch_of, varied_law

@@ -18,7 +18,6 @@ from xcrack.crack.measures import Measures, measures
 from xcrack.growth.step import (
     Step,
 )
-from xcrack.growth.uncertainty import uses_best
 from xcrack.mesh.mesh import Mesh
 from xcrack.runs.life_bar import life_bar
 from xcrack.runs.rerating import check_in_proportion, driving_forces
@@ -187,7 +186,7 @@ def _longest_bar(step: Step, c: int) -> Floats:
 
 def _uses_best_K(step: Step, c: int) -> Floats:
     """1 where growth followed the best K in all states, else 0 `(f,)`."""
-    return np.min([uses_best(state[c]) for state in step.sif], axis=0).astype(np.float64)
+    return np.min([state[c].has_best for state in step.sif], axis=0).astype(np.float64)
 
 
 def _of_N(step: Step, c: int) -> Floats:  # noqa: N802

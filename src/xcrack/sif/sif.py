@@ -199,6 +199,13 @@ class SIF:
         return self.K + self.eta
 
     @property
+    def has_best(self) -> Bools:
+        """Places where `best` is known in all modes `(f,)`: growth follows it there, else K."""
+        if self.errors is None:
+            return np.zeros(len(self.K), dtype=bool)
+        return np.asarray(np.isfinite(self.best).all(axis=1))
+
+    @property
     def reasons(self) -> tuple[str, ...]:
         """Why there is no estimate at a place, empty where there is one; one a place."""
         return self._errors.reasons
