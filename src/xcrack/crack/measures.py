@@ -39,26 +39,13 @@ def length_inside(crack: Crack, mesh: Mesh) -> float:
 _END = 1e-9  # share of a piece of a line within which it begins or ends
 
 
-def measures_of_line(
-    crack: Crack, mesh: Mesh, group: Ints
-) -> tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]:
-    """Length inside, depth by set, and mouths of a placed 2D crack.
+# Area, or length in 2D; length of the fronts; length and depth by number of a facet set; ends as
+# place, facet and number of the front. `group` is the number of the set of each facet.
+_Measures = tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]
 
-    Parameters
-    ----------
-    crack : Crack
-    mesh : Mesh
-    group : (f,) array of int
-        Number of the set of each facet of the mesh.
 
-    Returns
-    -------
-    length : float, length
-    front_length : float
-        0.
-    traces : dict of set to (0, depth)
-    ends : list of (x, facet, -1)
-    """
+def measures_of_line(crack: Crack, mesh: Mesh, group: Ints) -> _Measures:
+    """Measures of a placed 2D crack: its length inside, 0, depths, mouths with front -1."""
     outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     sides = mesh.points[mesh.facets[outer]]
     tips, _ = tip_frames(crack)
@@ -276,25 +263,8 @@ _REACH = 1.5  # cells up to which a front that ends inside is prolonged to the b
 _BISECTIONS = 60
 
 
-def measures_of_surface(
-    crack: Crack, mesh: Mesh, group: Ints
-) -> tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]:
-    """Area, length of fronts, length and depth by set, and ends of fronts of a placed 3D crack.
-
-    Parameters
-    ----------
-    crack : Crack
-    mesh : Mesh
-    group : (f,) array of int
-        Number of the set of each facet of the mesh.
-
-    Returns
-    -------
-    area : float, length²
-    front_length : float, length
-    traces : dict of set to (length, depth)
-    ends : list of (x, facet, number of the front)
-    """
+def measures_of_surface(crack: Crack, mesh: Mesh, group: Ints) -> _Measures:
+    """Measures of a placed 3D crack."""
     body = Body.of(mesh)
     outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     segment = _trace(crack, body)
@@ -508,8 +478,7 @@ class Measures:
 
 
 _ROUND_OFF = 1e-12  # of the body: a place as near to zero is zero
-_Raw = tuple[float, float, dict[int, tuple[float, float]], list[tuple[Floats, int, int]]]
-_BY_DIMENSION: dict[int, Callable[[Crack, Mesh, Ints], _Raw]] = {
+_BY_DIMENSION: dict[int, Callable[[Crack, Mesh, Ints], _Measures]] = {
     2: measures_of_line,
     3: measures_of_surface,
 }

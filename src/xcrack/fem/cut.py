@@ -368,8 +368,8 @@ class CellGeometry:
         Cells at tips or fronts, in parts.
     lips_up_to_ends : callable
         Where lips on facets of the mesh end.
-    tip_radii : callable
-        Of the disc around each tip, or the tube around each front, by crack.
+    tip_radii : callable (mesh, cracks, cuts, order, wanted radius or None, places of junctions)
+        Of the disc around each tip, or the tube around each front, by crack; length.
     split_facets : callable
         Facets `(k, d)`, given by their points, split where cracks cross them, as `FacetParts`; in
         3D those of cells at a front along psi too.
@@ -377,7 +377,7 @@ class CellGeometry:
         Integration points of `part_points`.
     lip_positions : callable
         Along the crack from where it enters the body; zero in 3D, where points have no order.
-    joined_cuts : callable
+    joined_cuts : callable (mesh, cuts of cracks drawn beyond those on which they end, junctions)
         Cuts without what lies beyond junctions, and the junctions in the mesh.
     nodes_at_joint : callable
         Nodes that a junction may change, and those close to it.

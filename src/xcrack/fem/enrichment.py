@@ -120,16 +120,6 @@ def front_radii(
     fronts, twice that where they are closed), 0.7 of the distance to sides that the front does not
     pierce, and 0.45 of that to other fronts; from 2.6 to 3.6 cells, and two at order 2. A wanted
     radius is used, and shrunk only where the body or another front demands; never below two cells.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    cracks : tuple of Crack
-    cuts : tuple of Cut
-    order : int
-    radius : float, length, optional
-    meeting : (0, 3) array
-        Fronts meet no junctions.
     """
     del meeting
     least_cells, most_cells = _RANGE[order]

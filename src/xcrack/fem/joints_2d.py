@@ -55,20 +55,7 @@ class Joint:
 def joined_cuts(
     mesh: Mesh, cuts: tuple[Cut, ...], junctions: tuple[Junction, ...]
 ) -> tuple[tuple[Cut, ...], tuple[Joint, ...]]:
-    """Cuts without what lies beyond junctions, and the junctions in the mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    cuts : tuple of Cut
-        Of cracks prolonged beyond those on which they end.
-    junctions : tuple of Junction
-
-    Returns
-    -------
-    cuts : tuple of Cut
-    joints : tuple of Joint
-    """
+    """Cuts without what lies beyond junctions, and the junctions in the mesh."""
     result, joints = list(cuts), []
     for junction in junctions:
         through_cut, ending, joint = _joined_pair(

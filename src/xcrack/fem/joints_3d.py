@@ -25,19 +25,7 @@ _CLEAR = 0.7  # of a cell, between that front and the arm: at less K of it is fo
 def joined_cuts(
     mesh: Mesh, cuts: tuple[Cut, ...], junctions: tuple[Junction, ...]
 ) -> tuple[tuple[Cut, ...], tuple[Joint, ...]]:
-    """Cuts without what lies beyond junctions, and the junctions in the mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    cuts : tuple of Cut
-        Of arms drawn through the cracks on which they end.
-    junctions : tuple of Junction
-
-    Returns
-    -------
-    cuts : tuple of Cut
-    joints : tuple of Joint
+    """Cuts without what lies beyond arms, and the junctions in the mesh.
 
     Raises
     ------
