@@ -37,7 +37,7 @@ from xcrack.fem.cut import cut  # noqa: E402
 from xcrack.fem.facets import lip_points  # noqa: E402
 from xcrack.fem.function_space import function_space  # noqa: E402
 from xcrack.fem.loads import known_unknowns, load_vector  # noqa: E402
-from xcrack.fem.system import System, levels  # noqa: E402
+from xcrack.fem.system import CELLS, System, levels  # noqa: E402
 from xcrack.linalg.engine import ContactRows  # noqa: E402
 from xcrack.linalg.iterative import iterative_system  # noqa: E402
 from xcrack.linalg.rigid_motion import balanced_loads, free_motion  # noqa: E402
@@ -77,12 +77,12 @@ def measure(n: int, order: int = 1) -> dict[str, object]:
         return result
 
     problem = timed("mesh", scene, n, order)
-    mesh, numerics = problem.mesh, problem.numerics
+    mesh, numerics, geometry = problem.mesh, problem.numerics, CELLS[problem.mesh.dim]
     timed("mesh", lambda: (mesh.gradient, mesh.edges, mesh.facets, mesh.cell_size, mesh.cell_tree))
     cracks = timed("crack", lambda: problem.placed)
     phi = timed("level sets", levels, mesh, cracks[0], numerics)
-    cuts = (timed("cutting", cut, mesh, phi),)
-    where = timed("cutting", function_space, mesh, order, cracks, cuts, numerics)
+    cuts = (timed("cutting", cut, mesh, phi, geometry),)
+    where = timed("cutting", function_space, mesh, order, cracks, cuts, numerics, geometry)
     lips = (timed("cutting", lip_points, where, 0),)
     plain = timed("bulk", bulk, problem.elasticity, order)
     enriched, n_points, _ = timed(
