@@ -75,6 +75,18 @@ def test_surface_crack(tolerance):
     assert adapted.rounds[-1].unknowns < 53_000
 
 
+@pytest.mark.parametrize("states", [[1.0], [0.0, 1.0]])
+def test_places_beside_a_free_surface_do_not_count(states):
+    """Those within a quarter of the radius of half a penny; also where the first state is at rest."""
+    half_penny = block(xc.penny_crack((-1, 0.02, 0.013), (0, 0, 1), 0.4))
+    adapted = xc.adapt(half_penny, 0.1, states, progress=False)
+    sif = adapted.sifs[-1][0]
+    x = np.abs(sif.x[:, 1] - 0.02)
+    arc = 0.4 * np.minimum(np.arccos(np.clip(x / 0.4, 0, 1)), np.pi / 2)  # from the nearer end
+    has_room = (arc > 1.1 * 0.25 * 0.4).sum(), (arc > 0.9 * 0.25 * 0.4).sum()
+    assert has_room[0] <= len(adapted.rounds[-1].best) <= has_room[1] < len(sif.K) - 4
+
+
 @pytest.mark.slow
 @pytest.mark.mission
 def test_corner_crack():

@@ -1,12 +1,15 @@
 """Cracks that mean something else than they seem to when they are put into a mesh, or grow."""
 
-import re
 import warnings
 
 import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.crack.advance_2d import advance
+from xcrack.crack.lines import touching_points
+from xcrack.crack.placing_3d import short_fronts
+from xcrack.crack.stations import place_crack
 
 STEEL = xc.Isotropic(E=1.0, nu=0.3, plane="strain")
 BOX = xc.box((-0.5, -0.5), (0.5, 0.5), 16)
@@ -41,6 +44,21 @@ def test_cracks_that_meet_outside_the_body_are_not_refused():
     assert tips == [(1,), (1,)]
 
 
+def test_touching_points_against_plain_loops():
+    rng = np.random.default_rng(14142)
+    a, b = rng.integers(0, 5, (30, 2)).astype(float), rng.integers(0, 5, (40, 2)).astype(float)
+    wanted = []
+    for x, line in ((a, b), (b, a)):
+        for p in x:
+            for q, r in zip(line, line[1:]):
+                s = r - q
+                t = np.clip((p - q) @ s / max(s @ s, 1e-300), 0, 1)
+                if np.linalg.norm(p - q - t * s) <= 1e-9:
+                    wanted.append(p)
+                    break
+    np.testing.assert_array_equal(touching_points(a, b, 1e-9), wanted)
+
+
 @pytest.mark.parametrize(
     ("points", "says"),
     [
@@ -72,33 +90,33 @@ def test_a_tip_beside_its_own_crack():
 # --- growth across itself ---------------------------------------------------------------------
 
 
-def grow(points, angle, da, steps=1):
-    """A run in which each tip turns by its angle in each step, whatever K is."""
-
-    def criterion(K, nu):
-        _, dK, R = xc.max_hoop_stress(K, nu)
-        return np.array(angle[: K.shape[1]]), dK, R
-
-    def response(problem, states, reuse, bars):
-        one = np.tile([1.0, 0.0], (len(problem.stations.x), 1))
-        return xc.Response.of_K(problem, states, [state * one for state in states])
-
-    problem = xc.Problem(BOX, STEEL, [xc.line_crack(points)])
-    law, cycle = xc.paris(1.0, 2.0), xc.Cycle(0.0, 1.0)
-    run = xc.grow(problem, law, criterion, cycle, da, max_steps=steps + 1, integrator="euler",
-                  response=response, progress=False)  # fmt: skip
-    return xc.collect(run)
-
-
-def test_growth_across_itself_names_the_place():
-    hook = [(-0.6, 0.0), (0.2, 0.0), (0.2, 0.2), (0.0, 0.2)]
-    on = grow(hook, [np.pi / 2], 0.1).steps[-1].cracks[0]
+def test_advance_across_itself_names_the_place():
+    crack = place_crack(xc.line_crack([(-0.6, 0.0), (0.2, 0.0), (0.2, 0.2), (0.0, 0.2)]), BOX)
+    on = advance(crack, [np.pi / 2], [0.1])
     np.testing.assert_allclose(on.points[-1], (0.0, 0.1), atol=1e-15)
-    ended = grow(hook, [np.pi / 2], 0.3, 2).ended
-    assert re.search(r"across itself near \[0\.0, -?0\.0\]", ended) or "same crack" in ended
-    right = np.pi / 2 - 0.1  # both up, and into each other
-    ended = grow([(-0.2, 0.0), (0.2, 0.0)], [right, right], 0.15, 3).ended
-    assert "across itself" in ended or "a crack that closes" in ended
+    with pytest.raises(xc.GeometryError, match=r"across itself near \[0.0, 0.0\]"):
+        advance(crack, [np.pi / 2], [0.3])
+    two = place_crack(xc.line_crack([(-0.2, 0.0), (0.2, 0.0)]), BOX)
+    right = np.pi / 2 - 0.1
+    one = advance(two, [right, right], [0.15, 0.15])  # both up
+    with pytest.raises(xc.GeometryError, match="across itself"):
+        advance(one, [right, right], [0.4, 0.4])  # and into each other
+
+
+@pytest.mark.parametrize(
+    ("angle", "da", "says"),
+    [
+        ([np.pi], [0.1], "turns back"),
+        ([0.1], [-0.1], "does not shrink"),
+        ([np.nan], [0.1], r"angle\[0\] = nan"),
+        ([0.1, 0.1], [0.1], r"shape \(1,\)"),
+        ([0.1], "far", "str entries"),
+    ],
+)
+def test_advances_that_are_none(angle, da, says):
+    crack = place_crack(xc.line_crack([(-0.6, 0.0), (0.2, 0.0)]), BOX)
+    with pytest.raises(xc.GeometryError, match=says):
+        advance(crack, angle, da)
 
 
 def test_a_run_ends_where_a_crack_grows_across_itself():
@@ -183,28 +201,29 @@ def test_a_front_shorter_than_a_cell_is_reported_here_and_in_plan():
         problem = xc.Problem(mesh, steel, [crack])
     row = xc.plan(problem)["tip functions"]
     assert not row.used
-    words = r"the front at .*, (\S+) long without .* is shorter than a cell \((\S+)\)"
-    length, cell = map(float, re.search(words, row.reason).groups())
-    assert length < cell == pytest.approx(mesh.cell_size.max(), rel=1e-3)
-    assert 0.2 < length < 0.6  # of .6, without half a cell at both ends
+    (short,) = short_fronts(crack, mesh)
+    assert str(short) in row.reason
+    assert short.length < short.cell == pytest.approx(mesh.cell_size.max())
+    assert 0.2 < short.length < 0.6  # of .6, without half a cell at both ends
     fine = xc.box((0, 0, 0), (4, 4, 0.6), (25, 25, 8))
     with warnings.catch_warnings():
         warnings.simplefilter("error", xc.XcrackWarning)
         problem = xc.Problem(fine, steel, [crack])
+    assert short_fronts(crack, fine) == []
     assert xc.plan(problem)["tip functions"].used
 
 
 @pytest.mark.parametrize(("depth", "cells"), [(0.05, (10, 1, 10)), (0.15, (10, 2, 10))])
 def test_a_front_in_a_slab_of_a_cell_is_reported(depth, cells):
     """It would be cut in two without a word; a crack that is drawn through is."""
-    mesh, steel = xc.box((-1, 0, -1), (1, 0.1 * cells[1], 1), cells), xc.Isotropic(1.0, 0.3)
+    mesh = xc.box((-1, 0, -1), (1, 0.1 * cells[1], 1), cells)
     crack = xc.plane_crack([(-2, -1, 0.02), (2, -1, 0.02), (2, depth, 0.02), (-2, depth, 0.02)])
     with pytest.warns(xc.XcrackWarning, match=r"within half a cell .* Take at least three cells"):
-        assert xc.Problem(mesh, steel, [crack]).placed[0].fronts == ()
+        assert place_crack(crack, mesh).fronts == ()
     with warnings.catch_warnings():
         warnings.simplefilter("error", xc.XcrackWarning)
         through = xc.plane_crack([(-2, -1, 0.02), (2, -1, 0.02), (2, 1, 0.02), (-2, 1, 0.02)])
-        assert xc.Problem(mesh, steel, [through]).placed[0].fronts == ()
+        assert place_crack(through, mesh).fronts == ()
 
 
 def test_the_same_crack_twice_is_refused_on_any_mesh():

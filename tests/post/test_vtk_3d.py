@@ -6,6 +6,9 @@ import pytest
 
 import xcrack as xc
 from xcrack import History, Step
+from xcrack.output.lip_faces_3d import lip_faces
+from xcrack.output.pieces import piece_cells, pieces
+from xcrack.runs.table import polylines
 
 N = 6
 
@@ -76,6 +79,7 @@ def volume(x):
 
 def test_pieces_fill_the_body(tmp_path, pulled):
     """Round-off: sums of some thousand volumes; no piece is turned inside out."""
+    assert pieces(pulled).volume.sum() == pytest.approx(8.0, rel=1e-13)
     grid = read(xc.write(pulled, tmp_path / "body")[0])
     turned = np.concatenate([volume(grid.points[block.data[:, :4]]) for block in grid.cells])
     assert turned.min() >= -1e-18
@@ -90,21 +94,16 @@ def test_midpoints_lie_in_the_middle_in_the_order_of_vtk(tmp_path, pulled):
         np.testing.assert_allclose(x[:, node], (x[:, i] + x[:, j]) / 2, atol=1e-14)
 
 
-def test_points_on_the_lips_exist_twice_and_carry_the_jump(tmp_path, pulled):
+def test_points_on_the_lips_exist_twice_and_carry_the_jump(pulled):
     """Round-off: pieces and `displacement` evaluate the same functions at the same points."""
-    body = read(xc.write(pulled, tmp_path / "body")[0])
-    is_corner = np.zeros(len(body.points), dtype=bool)
-    is_corner[np.concatenate([block.data[:, :4].ravel() for block in body.cells])] = True
-    points, displacement = (
-        values[is_corner] for values in (body.points, body.point_data["displacement"])
-    )
-    place = np.round(points, 10)
+    body = pieces(pulled)
+    place = np.round(body.points, 10)
     _, number, count = np.unique(place, axis=0, return_inverse=True, return_counts=True)
     assert count.max() == 2
     order = np.argsort(number.ravel(), kind="stable")
     pairs = order[np.isin(number.ravel()[order], np.nonzero(count == 2)[0])].reshape(-1, 2)
-    x = points[pairs[:, 0]]
-    jump = np.diff(displacement[pairs], axis=1)[:, 0]
+    x = body.points[pairs[:, 0]]
+    jump = np.diff(body.displacement[pairs], axis=1)[:, 0]
     plus, minus = pulled.displacement(x, side=1), pulled.displacement(x, side=-1)
     up = np.sign(((plus - minus) * jump).sum(axis=1))[:, None]
     np.testing.assert_allclose(up * jump, plus - minus, atol=1e-11 * np.abs(plus).max())
@@ -115,13 +114,15 @@ def test_points_on_the_lips_exist_twice_and_carry_the_jump(tmp_path, pulled):
     assert np.linalg.norm(inner[:, None] - x, axis=2).min(axis=1).max() < 1e-9
 
 
-def test_pieces_lie_on_one_side(tmp_path, pulled):
-    """A piece behind the front has phi of one sign: the plane is cut exactly."""
-    grid = read(xc.write(pulled, tmp_path / "body")[0])
-    x = np.concatenate([grid.points[block.data[:, :4]] for block in grid.cells])
-    phi = (x - (0.083, 0.0, 0.047)) @ np.array([-0.016, 0.0, 1.383]) / np.hypot(0.016, 1.383)
-    behind = x[..., 0].max(axis=1) < 0.083 - 1.0 / N
-    assert ((phi.min(axis=1) > -1e-12) | (phi.max(axis=1) < 1e-12))[behind].all()
+def test_sub_cells_lie_on_one_side(pulled):
+    """A piece off the crack has phi of one sign: linear level sets, cut exactly."""
+    cells = piece_cells(pulled.space)
+    cut = pulled.space.cuts[0]
+    phi = np.einsum(
+        "svb,sb->sv", cells.bary, cut.level_set.phi[pulled.problem.mesh.cells[cells.cell]]
+    )
+    split = (cut.is_cut | cut.is_tip)[cells.cell]
+    assert (cells.side[split, 0, None] * phi[split] > -1e-13).all()
 
 
 def test_a_body_without_cracks_is_its_mesh(tmp_path):
@@ -151,59 +152,47 @@ def test_hydrostatic_pressure_is_written_exactly(tmp_path, penny):
     assert data.GetNumberOfPolys() == len(penny.space.cuts[0].lip_bary)
 
 
-def lips_of(folder, solution):
-    """Points, values and triangles of the crack faces in their file."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    x, at_points, at_cells, data = read_poly(xc.write(solution, folder / "lips")[1])
-    triangles = vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3)
-    return x, at_points, at_cells, triangles
-
-
-def test_lips_are_the_crack(tmp_path, penny, pulled):
+def test_lips_are_the_crack(penny, pulled):
     """Area and normal against geometry.
 
     The plane crack is exact; the penny's front is made of straight pieces in cells a third of
     its radius wide: discretisation.
     """
-    x, at_points, _, triangles = lips_of(tmp_path, pulled)
+    flat = lip_faces(pulled, 0)
     along = np.array([1.383, 0, 0.016])
     length = 1.083 * np.linalg.norm(along) / along[0]
-    assert areas(x[triangles]).sum() == pytest.approx(2 * length, rel=1e-10)
+    assert flat.area.sum() == pytest.approx(2 * length, rel=1e-10)
     normal = np.array([-along[2], 0, along[0]]) / np.linalg.norm(along)
-    upward = np.sign(at_points["normal"][0] @ normal)
-    np.testing.assert_allclose(upward * at_points["normal"],
-                               np.broadcast_to(normal, x.shape), atol=1e-9)  # fmt: skip
-    on_front = x[np.abs(x[:, 0] - 0.083) < 1e-9]
-    assert np.ptp(on_front[:, 1]) == pytest.approx(2, rel=1e-10)
-    x, _, _, triangles = lips_of(tmp_path, penny)
-    assert areas(x[triangles]).sum() == pytest.approx(np.pi / 4, rel=0.05)
-    a, b, c = x[triangles].transpose(1, 0, 2)
-    total = np.cross(b - a, c - a).sum(axis=0)
-    assert total @ [1, 2, 3] == pytest.approx(2 * areas(x[triangles]).sum() * np.sqrt(14), rel=1e-3)
+    upward = np.sign(flat.normal[0] @ normal)
+    np.testing.assert_allclose(upward * flat.normal, np.broadcast_to(normal, flat.normal.shape),
+                               atol=1e-9)  # fmt: skip
+    x = flat.points[flat.front]
+    assert np.linalg.norm(x[:, 1] - x[:, 0], axis=1).sum() == pytest.approx(2, rel=1e-10)
+    np.testing.assert_allclose(x[..., 0], 0.083, atol=1e-9)
+    disc = lip_faces(penny, 0)
+    assert disc.area.sum() == pytest.approx(np.pi / 4, rel=0.05)
+    assert len(disc.mouth) == 0
+    turned = disc.points[disc.triangles]
+    turned = np.cross(turned[:, 1] - turned[:, 0], turned[:, 2] - turned[:, 0]).sum(axis=0)
+    assert turned @ [1, 2, 3] == pytest.approx(2 * disc.area.sum() * np.sqrt(14), rel=1e-3)
 
 
-def areas(x):
-    return np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1) / 2
-
-
-def test_lips_move_with_the_body(tmp_path, pulled):
+def test_lips_move_with_the_body(pulled):
     """Jump and gap at the vertices are those of the solution, zero on the front; round-off."""
-    x, at_points, at_cells, triangles = lips_of(tmp_path, pulled)
-    jump = at_points["displacement_plus"] - at_points["displacement_minus"]
-    scale = np.abs(at_points["displacement_plus"]).max()
-    np.testing.assert_allclose(jump[np.abs(x[:, 0] - 0.083) < 1e-9], 0, atol=1e-6 * scale)
-    inner = x[:, 0] < 0.05
-    places = x[inner]
-    expected = pulled.displacement(places, side=1) - pulled.displacement(places, side=-1)
-    np.testing.assert_allclose(jump[inner], expected, atol=1e-9 * scale)
-    assert (at_points["gap"][inner] > 0).all()
+    lips = lip_faces(pulled, 0)
+    scale = np.abs(lips.plus).max()
+    np.testing.assert_allclose(lips.jump[np.unique(lips.front)], 0, atol=1e-6 * scale)
+    inner = lips.points[:, 0] < 0.05
+    x = lips.points[inner]
+    expected = pulled.displacement(x, side=1) - pulled.displacement(x, side=-1)
+    np.testing.assert_allclose(lips.jump[inner], expected, atol=1e-9 * scale)
+    assert (lips.gap[inner] > 0).all()
     # The mean gap of a triangle lies between the smallest and the largest at its vertices,
     # but near the front, where the root of the distance is no straight line.
-    at, mean = at_points["gap"][triangles], at_cells["gap_mean"]
-    far = x[triangles][..., 0].max(axis=1) < -0.5
-    assert (mean > at.min(axis=1) - 1e-6 * scale)[far].all()
-    assert (mean < at.max(axis=1) + 1e-2 * scale)[far].all()
+    at = lips.gap[lips.triangles]
+    far = lips.points[lips.triangles][..., 0].max(axis=1) < -0.5
+    assert (lips.mean_gap > at.min(axis=1) - 1e-6 * scale)[far].all()
+    assert (lips.mean_gap < at.max(axis=1) + 1e-2 * scale)[far].all()
 
 
 def test_fronts_have_their_frames_and_K(tmp_path, penny):
@@ -274,3 +263,4 @@ def test_a_series_has_bodies_lips_and_fronts(tmp_path, penny):
     assert data.GetNumberOfPolys() == len(crack.faces)
     assert data.GetNumberOfLines() == 1
     assert len(at_cells["crack"]) == len(crack.faces) + 1
+    assert polylines(penny.space.cracks) == (tmp_path / "steps" / names[3]).read_text()

@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.view import report as reporting
+from xcrack.view.report_viewer import packed_layers
 
 STEEL = xc.Isotropic(E=210e3, nu=0.3, plane="strain")
 pytestmark = [
@@ -230,8 +232,23 @@ def test_too_much_is_left_out_and_named(monkeypatch, tmp_path):
     text, _, numbers = read(xc.report(penny(), tmp_path / "large.html"))
     assert numbers["view"] == {"layers": 0}
     assert "too much for a page" in text
+    assert packed_layers([]) is None
     # What cannot be drawn without a renderer is named.
     assert any("Mesh" in words for words in numbers["pictures"]["missing"])
+
+
+def test_a_section_of_ones_own(monkeypatch, tmp_path):
+    """How later features add theirs."""
+    from xcrack.base.markup import element
+    from xcrack.view.report_source import Section
+
+    def own(source):
+        return Section("own", "Own", element("p", f"{len(source.cracks)} crack"), {"n": 1})
+
+    monkeypatch.setattr(reporting, "SECTIONS", (*reporting.SECTIONS, own))
+    text, _, numbers = read(xc.report(xc.solve(plate()), tmp_path / "own.html"))
+    assert "<p>1 crack</p>" in text
+    assert numbers["own"] == {"n": 1}
 
 
 def test_body_without_crack(tmp_path):
