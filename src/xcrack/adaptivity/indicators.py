@@ -143,7 +143,9 @@ def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
         by_crack.append(rows)
     # Fronts that end at no side have no places beside one.
     surface_reach = tuple(
-        _SHARE * surface_size(crack, problem.mesh) if len(ending_fronts(rows[0])) else 0.0
+        _SHARE * surface_size(crack, problem.mesh)
+        if any(len(ending_fronts(row)) for row in rows)
+        else 0.0
         for crack, rows in zip(problem.placed, by_crack, strict=True)
     )
     sifs_of = tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions)))

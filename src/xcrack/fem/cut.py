@@ -368,6 +368,8 @@ class CellGeometry:
         Cells at tips or fronts, in parts.
     lips_up_to_ends : callable
         Where lips on facets of the mesh end.
+    across_lips : callable
+        A vector across each lip, given by its corners `(l, d, d)`.
     tip_radii : callable (mesh, cracks, cuts, order, wanted radius or None, places of junctions)
         Of the disc around each tip, or the tube around each front, by crack; length.
     split_facets : callable
@@ -389,6 +391,7 @@ class CellGeometry:
 
     end_parts: Callable[..., Any]
     lips_up_to_ends: Callable[..., tuple[Floats, Ints]]
+    across_lips: Callable[[Floats], Floats]
     tip_radii: Callable[..., list[tuple[float, ...]]]
     split_facets: Callable[..., Any]
     facet_points: Callable[..., tuple[Ints, Floats, Floats]]
@@ -447,7 +450,7 @@ def cut(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> Cut:
         sub_side=lock(np.concatenate([s[3] for s in subs])),
         lip_cell=lock(lip_cell),
         lip_bary=lock(lip_bary),
-        lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary)),
+        lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary, geometry)),
         cut_edge=lock(np.where(edge_flag & has_position, positions, np.nan)),
         side=lock(np.where(is_crossed, 0, np.where(low >= 0, 1, -1))),
         kinks=kinks,
@@ -526,17 +529,26 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> _Lip
     return _Lips(cells, np.where(np.abs(bary) < 1e-14, 0.0, bary))
 
 
-def _lip_normals(mesh: Mesh, phi: Floats, cell: Ints, bary: Floats) -> Floats:
+def _lip_normals(
+    mesh: Mesh, phi: Floats, cell: Ints, bary: Floats, geometry: CellGeometry
+) -> Floats:
     """Unit normals of lip segments, exactly perpendicular to them, towards growing phi."""
     # From a corner of the cell: far from 0 a short segment has lost its direction.
     nodes = mesh.points[mesh.cells[cell[:, 1]]]
     corners = np.einsum("lvb,lbd->lvd", bary[:, 1], nodes - nodes[:, :1])
     slope = np.einsum("lb,lbd->ld", phi[mesh.cells[cell[:, 1]]], mesh.gradient[cell[:, 1]])
-    # In 2D across the segment and the direction out of the plane.
-    edges = np.zeros((2, len(corners), 3))
-    edges[0, :, 2] = 1.0
-    edges[3 - mesh.dim :, :, : mesh.dim] = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 0)
-    normal = np.cross(*edges)[:, : mesh.dim]
+    normal = geometry.across_lips(corners)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = normal / np.maximum(length, 1e-300)
     return np.asarray(normal * np.sign(np.einsum("ld,ld->l", normal, slope))[:, None])
+
+
+def across_segments(corners: Floats) -> Floats:
+    """Vectors across lips in 2D `(l, 2)`."""
+    segment = corners[:, 1] - corners[:, 0]
+    return np.stack([-segment[:, 1], segment[:, 0]], axis=1)
+
+
+def across_triangles(corners: Floats) -> Floats:
+    """Vectors across lips in 3D `(l, 3)`."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

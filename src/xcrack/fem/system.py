@@ -113,12 +113,14 @@ def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
 
 CELLS = {
     2: CellGeometry(
-        cut_cells.tip_parts, cut_cells.lips_up_to_tips, enrichment.disc_radii,
+        cut_cells.tip_parts, cut_cells.lips_up_to_tips, cut_cells.across_segments,
+        enrichment.disc_radii,
         facets.split_edges, facets.points_on_segments, facets.positions_along_line,
         joints_2d.joined_cuts, joint_nodes.nodes_around_point, least_trace=1e-11,
     ),
     3: CellGeometry(
-        cut_cells.front_parts, cut_cells.lips_up_to_fronts, enrichment.front_radii,
+        cut_cells.front_parts, cut_cells.lips_up_to_fronts, cut_cells.across_triangles,
+        enrichment.front_radii,
         facets.split_triangles, facets.points_on_triangles, facets.positions_on_surface,
         joints_3d.joined_cuts, joint_nodes.nodes_along_line, least_trace=1e-3,
     ),
