@@ -77,7 +77,7 @@ def test_surface_crack(tolerance):
 
 @pytest.mark.parametrize("states", [[1.0], [0.0, 1.0]])
 def test_places_beside_a_free_surface_do_not_count(states):
-    """Those within a quarter of the radius of half a penny; also where the first state is at rest."""
+    """Within a quarter of the radius of half a penny; also where the first state is at rest."""
     half_penny = block(xc.penny_crack((-1, 0.02, 0.013), (0, 0, 1), 0.4))
     adapted = xc.adapt(half_penny, 0.1, states, progress=False)
     sif = adapted.sifs[-1][0]
