@@ -160,7 +160,7 @@ def test_points_of_triangles_near_tips():
     for levels, degree in ((4, 2), (1, 10)):
         number, place, weight = triangle_points(
             bary, x, np.full(40, 0.5), bears, fan, tips, levels, *simplex_rule(2, 2),
-            *simplex_rule(2, degree), *gauss(5), *gauss(8),
+            *simplex_rule(2, degree), *gauss(5), *gauss(8), np.zeros(2), np.zeros(0),
         )  # fmt: skip
         assert (np.diff(number) >= 0).all()
         assert np.bincount(number, weight) == pytest.approx(np.full(40, 0.5), abs=1e-14)
@@ -180,3 +180,32 @@ def test_points_of_triangles_near_tips():
         exact = h * (np.arcsinh(t[1] / h) - np.arcsinh(t[0] / h))
         integral = np.bincount(number, weight / r)[30:] * h * length
         assert integral == pytest.approx(exact, rel=2e-4)
+
+
+def test_fans_begin_and_end_at_circles():
+    """What is left of a triangle between two circles around its first corner, in polar form."""
+    from xcrack.mesh.kernels.splitting import triangle_points
+    from xcrack.mesh.simplex import gauss, simplex_rule
+
+    rng = np.random.default_rng(5219)
+    x, radii = rng.uniform(size=(40, 3, 2)), np.array([0.2, 0.35, 0.6])
+    x[:, 0] = x[0, 0]
+    side, other = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    cross = np.abs(side[:, 0] * other[:, 1] - side[:, 1] * other[:, 0])
+    rules = *simplex_rule(2, 2), *simplex_rule(2, 2), *gauss(5), *gauss(8)
+    bary, flags = np.broadcast_to(np.eye(3), (40, 3, 3)).copy(), np.ones(40, dtype=bool)
+    triangles = bary, x, cross / 2, flags, flags, x[0, :1], 4, *rules
+    number, place, weight = triangle_points(*triangles, x[0, 0], radii)
+    r = np.linalg.norm(np.einsum("qb,qbd->qd", place, x[number]) - x[0, 0], axis=1)
+    assert (r > radii[0]).all()
+    assert (r < radii[-1]).all()
+    tau, share = gauss(4000)
+    far = side[:, None] + tau[:, None] * (other - side)[:, None]
+    reach = np.clip(np.linalg.norm(far, axis=2), radii[0], radii[-1])
+    turn = share * cross[:, None] / np.einsum("kqd,kqd->kq", far, far)
+    for p in (0, 1):  # area, and the integral of r
+        exact = ((reach ** (2 + p) - radii[0] ** (2 + p)) / (2 + p) * turn).sum(axis=1)
+        assert np.bincount(number, weight * r**p, 40) == pytest.approx(exact, abs=2e-5)
+    # Around another place the fans are whole.
+    number, _, weight = triangle_points(*triangles, x[0, 0] + 0.1, radii)
+    assert np.bincount(number, weight) == pytest.approx(cross / 2, abs=1e-14)

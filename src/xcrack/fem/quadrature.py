@@ -21,13 +21,35 @@ _LEVELS = 5  # bisections towards a tip before the fan takes over
 _EDGE_POINTS = 6  # Gauss points of a boundary piece
 
 
+@dataclass(frozen=True, eq=False)
+class Circles:
+    """Where an integrand around a tip in 2D begins, ends and is not smooth.
+
+    Attributes
+    ----------
+    centre : (2,) array, length
+        The tip.
+    radii : (k,) array, length
+        Increasing: it is zero within the first and beyond the last.
+    """
+
+    centre: Floats
+    radii: Floats
+
+
 def _plane_points(
-    space: FunctionSpace, subs: "SubCells", with_tip: Bools, n: int, degree: int
+    space: FunctionSpace,
+    subs: "SubCells",
+    with_tip: Bools,
+    n: int,
+    degree: int,
+    circles: Circles | None,
 ) -> tuple[Ints, Floats, Floats]:
     """Number, place and share of the points of sub-cells, in their order."""
     from xcrack.mesh.kernels.splitting import triangle_points
 
     mesh = space.mesh
+    circles = circles or Circles(np.zeros(2), np.zeros(0))
     tips = np.array([tip.x for tip in space.tips]).reshape(-1, 2)
     # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
     # enough (K is the same to its error with half of the points, measured), and one whose rule does
@@ -37,6 +59,7 @@ def _plane_points(
     number, place, share = triangle_points(
         subs.bary, corners, subs.fraction, with_tip, subs.fan, tips, _LEVELS,
         *simplex_rule(2, degree), *simplex_rule(2, degree_of_simplex), *gauss(n + 1), *gauss(n + 4),
+        circles.centre, circles.radii,
     )  # fmt: skip
     return number, place, share
 
@@ -585,7 +608,12 @@ def _split_along(
 
 
 def cell_points(
-    space: FunctionSpace, cells: Ints, n: int, degree: int, is_graded: bool = False
+    space: FunctionSpace,
+    cells: Ints,
+    n: int,
+    degree: int,
+    is_graded: bool = False,
+    circles: Circles | None = None,
 ) -> Points:
     """Integration points of cells, sorted by cell.
 
@@ -600,11 +628,13 @@ def cell_points(
     is_graded : bool
         In 3D: sub-cells on which tip functions act, and which do not touch a front, are bisected
         towards it and have a rule of that degree too.
+    circles : Circles, optional
+        In 2D: fans around their centre begin and end there.
     """
     subs = sub_cells(space, cells)
     with_tip = space.has_tip[subs.cell]
     if space.dim == 2:
-        number, where, share = _plane_points(space, subs, with_tip, n, degree)
+        number, where, share = _plane_points(space, subs, with_tip, n, degree, circles)
         cell = subs.cell[number]
         return Points(cell, where, share * space.mesh.volume[cell], subs.side[number])
     plain_rows = (~with_tip).nonzero()[0]

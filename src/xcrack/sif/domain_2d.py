@@ -11,12 +11,13 @@ from xcrack.base.arrays import Floats, Ints
 from xcrack.base.checks import sound
 from xcrack.fem.assembly import Tabulated, tabulate_functions
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.fem.quadrature import Points, cell_points
+from xcrack.fem.quadrature import Circles, Points, cell_points
 from xcrack.mesh.locate import nearest_boundary
 from xcrack.sif.accuracy import Domain, check, scale_of
 from xcrack.sif.common import has_effect, material_at_tip, with_closed
 from xcrack.sif.interaction_2d import (
     constant_part,
+    inner_radii,
     lip_terms,
     plain_terms,
     point_terms,
@@ -55,7 +56,7 @@ class RingPart:
     has_other_material: bool
 
 
-def ring_parts(solution: Solution, t: int, inner_radius: float, outer: float) -> Iterable[RingPart]:
+def ring_parts(solution: Solution, t: int, radii: Floats) -> Iterable[RingPart]:
     """Cells around tip t by class, with points and functions where functions are enriched.
 
     Where the solve keeps its factor for estimates, these points stay with it too: K and the
@@ -66,13 +67,13 @@ def ring_parts(solution: Solution, t: int, inner_radius: float, outer: float) ->
     solution : Solution
     t : int
         Number of the tip in `space.tips`.
-    inner_radius, outer : float, length
-        Radii between which the cells lie.
+    radii : (k,) array, length
+        Outer radii of the domains.
     """
-    parts, factored = _ring_parts(solution, t, inner_radius, outer), solution.factored
+    parts, factored = _ring_parts(solution, t, radii), solution.factored
     if factored is None:
         return parts
-    key = t, inner_radius, outer
+    key = t, *radii.tolist()
     parts_in_store: Iterable[RingPart] | None = factored.around_tips.get(key)
     if parts_in_store is None:
         parts_in_store = tuple(parts)
@@ -82,33 +83,35 @@ def ring_parts(solution: Solution, t: int, inner_radius: float, outer: float) ->
     return parts_in_store
 
 
-def _ring_parts(
-    solution: Solution, t: int, inner_radius: float, outer: float
-) -> Iterator[RingPart]:
+def _ring_parts(solution: Solution, t: int, radii: Floats) -> Iterator[RingPart]:
     space, elasticity = solution.space, solution.problem.elasticity
     x = space.tips[t].x
+    # Within the first radius the gradient of q vanishes, and from one to the next it is smooth.
+    circles = Circles(x, np.unique([inner_radii(space.order, radii), radii]))
+    inner_radius, outer = circles.radii[[0, -1]]
     for cells, n, degree in ring_classes(space, x, inner_radius, outer):
         if not elasticity.is_uniform:
             cells = np.setdiff1d(
                 cells, elasticity.cells_unlike(material_at_tip(solution, t), cells)
             )
-        yield _ring_part(space, cells, n, degree, False)
+        yield _ring_part(space, cells, n, degree, circles)
     if elasticity.is_uniform:
         return
     for cells, n, degree in ring_classes(space, x, 0.0, outer):
         cells = elasticity.cells_unlike(material_at_tip(solution, t), cells)
-        yield _ring_part(space, cells, n, degree, True)
+        yield _ring_part(space, cells, n, degree, None)
 
 
 def _ring_part(
-    space: FunctionSpace, cells: Ints, n: int, degree: int, has_other_material: bool
+    space: FunctionSpace, cells: Ints, n: int, degree: int, circles: Circles | None
 ) -> RingPart:
+    """Cells of the material at the tip, for which q is not smooth at circles, or of another one."""
     is_plain = space.signature[cells] == 0
     others = cells[~is_plain]
-    points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree))
+    points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree, circles))
     is_one_chunk = len(others) <= _CHUNK
     return RingPart(
-        cells[is_plain], degree, tuple(points) if is_one_chunk else points, has_other_material
+        cells[is_plain], degree, tuple(points) if is_one_chunk else points, circles is None
     )
 
 
@@ -130,10 +133,12 @@ def ring_classes(
             yield cells, n, degree
 
 
-def class_points(space: FunctionSpace, cells: Ints, n: int, degree: int) -> Iterator[Points]:
-    """Integration points of cells, of some cells at once."""
+def class_points(
+    space: FunctionSpace, cells: Ints, n: int, degree: int, circles: Circles | None = None
+) -> Iterator[Points]:
+    """Integration points of cells, of some cells at once; see `quadrature.Circles`."""
     for first in range(0, len(cells), _CHUNK):
-        yield cell_points(space, cells[first : first + _CHUNK], n, degree)
+        yield cell_points(space, cells[first : first + _CHUNK], n, degree, circles=circles)
 
 
 _OUTER = {1: 2.5, 2: 2.5}  # outer radius, as a multiple of the enriched radius
@@ -274,9 +279,7 @@ def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     ring = ring_around(solutions, t, radii)
     outer = float(radii.max())
     total = lip_terms(solutions, ring)
-    # Within the inner radius grad q vanishes.
-    inner_radius = float(ring.inner.min())
-    for part in ring_parts(solutions[0], t, inner_radius, outer):
+    for part in ring_parts(solutions[0], t, radii):
         total += plain_terms(solutions, ring, part)
         for values in part.other_points:
             total += point_terms(solutions, ring, values, part.has_other_material)

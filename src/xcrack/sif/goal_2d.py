@@ -47,7 +47,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     space, tip_material = solution.space, material_at_tip(solution, t)
     mesh, tip = space.mesh, space.tips[t]
     radii = radii_of(domain_of(solution, t))
-    outer, inner_radius = float(radii.max()), float(inner_radii(space.order, radii).min())
+    outer = float(radii.max())
     inner = float(inner_radii(space.order, radii[:1])[0])
     cut = space.cuts[tip.crack]
     psi = cut.level_set.psi[tip.number]
@@ -57,7 +57,7 @@ def tip_goal(solution: Solution, t: int) -> Goal:
         tip_material.lam, tip_material.mu,
     )  # fmt: skip
     parts, plain_parts = [], []
-    for part in ring_parts(solution, t, inner_radius, outer):
+    for part in ring_parts(solution, t, radii):
         if len(part.plain_cells):
             integrals = plain_ring(
                 part.plain_cells, mesh.points, mesh.cells, mesh.gradient, mesh.volume, cut.side,

@@ -433,44 +433,85 @@ def _put_rule(table, count, number, vertex, share, bary, weight):  # type: ignor
 
 
 @kernel
-def _put_fan(table, count, number, vertex, corner, share, s, ws, t, wt):  # type: ignore[no-untyped-def]
+def _where_far_side_meets(circles, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Places 0, …, 1 on the side from a to b, increasing, between which it crosses no circle."""
+    place = np.empty(2 * len(circles) + 2)
+    place[0], count = 0.0, 1
+    dx, dy = bx - ax, by - ay
+    square, half = dx * dx + dy * dy, ax * dx + ay * dy
+    for c in range(len(circles)):
+        below = half * half - square * (ax * ax + ay * ay - circles[c] * circles[c])
+        if circles[c] <= 0.0 or square <= 0.0 or not 0.0 < below < np.inf:
+            continue
+        for sign in (-1.0, 1.0):
+            at = (-half + sign * math.sqrt(below)) / square
+            if _SAME < at < 1.0 - _SAME:
+                i = count
+                while at < place[i - 1]:
+                    place[i] = place[i - 1]
+                    i -= 1
+                place[i] = at
+                count += 1
+    place[count] = 1.0
+    return place[: count + 1]
+
+
+@kernel
+def _put_fan(  # type: ignore[no-untyped-def]
+    table, count, number, vertex, corner, share, s, ws, t, wt, circles
+):
     """Points that sweep a triangle from vertex 0 in sectors, x = A + s² (E - A), E on the far side.
 
     Exact for polynomials, and for products of derivatives of the tip functions along r; the angle
-    is resolved by sectors of at most 0.6 rad.
+    is resolved by sectors of at most 0.6 rad. Rules begin and end at circles around vertex 0, and
+    nothing is put within the first and beyond the last.
     """
     ax, ay = corner[1, 0] - corner[0, 0], corner[1, 1] - corner[0, 1]
     bx, by = corner[2, 0] - corner[0, 0], corner[2, 1] - corner[0, 1]
-    a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
-    angle = abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
-    sectors = 1
-    while sectors * _SECTOR < angle:
-        sectors += 1
-    table = _with_room(table, count, sectors * len(s) * len(t))
-    end = 0.0
-    for k in range(sectors):
-        begin, part = end, (k + 1) / sectors
-        first, last = a * math.sin(part * angle), b * math.sin((1 - part) * angle)
-        end = first / (first + last) if first + last > 0 else part
-        for i in range(len(s)):
-            u, radial_weight = (
-                s[i] * s[i],
-                4 * s[i] ** 3 * ws[i],
-            )  # dV = 2 area u du dtau with u = s²
-            for j in range(len(t)):
-                tau = begin + (end - begin) * t[j]
-                table[count, 0] = number
-                for v in range(3):
-                    far_point = (1 - tau) * vertex[1, v] + tau * vertex[2, v]
-                    table[count, 1 + v] = (1 - u) * vertex[0, v] + u * far_point
-                table[count, 4] = share * (end - begin) * radial_weight * wt[j]
-                count += 1
+    place = _where_far_side_meets(circles, ax, ay, bx, by)
+    for piece in range(len(place) - 1):
+        start, width = place[piece], place[piece + 1] - place[piece]
+        stop = start + width
+        a0, a1 = (1 - start) * ax + start * bx, (1 - start) * ay + start * by
+        b0, b1 = (1 - stop) * ax + stop * bx, (1 - stop) * ay + stop * by
+        a, b = math.sqrt(a0 * a0 + a1 * a1), math.sqrt(b0 * b0 + b1 * b1)
+        angle = abs(math.atan2(a0 * b1 - a1 * b0, a0 * b0 + a1 * b1))
+        sectors = 1
+        while sectors * _SECTOR < angle:
+            sectors += 1
+        table = _with_room(table, count, sectors * (len(circles) - 1) * len(s) * len(t))
+        end = 0.0
+        for k in range(sectors):
+            begin, part = end, (k + 1) / sectors
+            first, last = a * math.sin(part * angle), b * math.sin((1 - part) * angle)
+            end = first / (first + last) if first + last > 0 else part
+            for c in range(len(circles) - 1):
+                for i in range(len(s)):
+                    for j in range(len(t)):
+                        tau = start + width * (begin + (end - begin) * t[j])
+                        x, y = (1 - tau) * ax + tau * bx, (1 - tau) * ay + tau * by
+                        square = max(x * x + y * y, 1e-300)
+                        reach = math.sqrt(square)
+                        low, high = circles[c] / reach, circles[c + 1] / reach
+                        if low >= 1.0:
+                            continue
+                        low, high = math.sqrt(low), math.sqrt(min(high, 1.0))
+                        root = low + (high - low) * s[i]
+                        u = root * root
+                        # dV = 2 area u du dtau with u = s²
+                        radial_weight = 4 * root**3 * (high - low) * ws[i]
+                        table[count, 0] = number
+                        for v in range(3):
+                            far_point = (1 - tau) * vertex[1, v] + tau * vertex[2, v]
+                            table[count, 1 + v] = (1 - u) * vertex[0, v] + u * far_point
+                        table[count, 4] = share * width * (end - begin) * radial_weight * wt[j]
+                        count += 1
     return table, count
 
 
 @kernel
 def _put_fans_around(  # type: ignore[no-untyped-def]
-    table, count, number, vertex, corner, share, tip, s, ws, t, wt, fan, fan_corner
+    table, count, number, vertex, corner, share, tip, s, ws, t, wt, fan, fan_corner, circles
 ):
     """Points of two fans around the place of a triangle that is nearest to a tip outside it."""
     best, along, least = 0, 0.0, np.inf
@@ -494,14 +535,16 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
         for b in range(2):
             fan_corner[0, b] = (1 - along) * corner[i, b] + along * corner[j, b]
             fan_corner[1, b], fan_corner[2, b] = corner[j2, b], corner[j3, b]
-        table, count = _put_fan(table, count, number, fan, fan_corner, share * part, s, ws, t, wt)
+        table, count = _put_fan(
+            table, count, number, fan, fan_corner, share * part, s, ws, t, wt, circles
+        )  # fmt: skip
     return table, count
 
 
 @kernel
 def triangle_points(  # type: ignore[no-untyped-def]
     bary, corners, share, bears_tip, fan, tips, levels, plain_rule, plain_share, near, near_share,
-    s, ws, t, wt,
+    s, ws, t, wt, centre, radii,
 ):  # fmt: skip
     """Integration points of triangles, denser towards tips where their functions act.
 
@@ -526,6 +569,11 @@ def triangle_points(  # type: ignore[no-untyped-def]
         Rule of those with tip functions that lie away from tips.
     s, ws, t, wt : (i,) and (j,) arrays
         Gauss rules of fans, along the radius and across.
+    centre : (2,) array, length
+        The tip whose fans begin and end at circles around it.
+    radii : (c,) array, length
+        Of these circles, increasing, at which an integrand is not smooth: it is zero within the
+        first and beyond the last. Where there are none, fans are whole.
 
     Returns
     -------
@@ -535,6 +583,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
     weight : (q,) array
     """
     stack, depths = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
+    everywhere = np.array([0.0, np.inf])
     part, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     vertex, one, one_corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     table, count = np.empty((len(bary) * len(plain_share), 5)), 0
@@ -543,8 +592,11 @@ def triangle_points(  # type: ignore[no-untyped-def]
             table, count = _put_rule(table, count, k, bary[k], share[k], plain_rule, plain_share)
             continue
         if fan[k]:
+            away = math.hypot(corners[k, 0, 0] - centre[0], corners[k, 0, 1] - centre[1])
+            is_at_centre = len(radii) > 0 and away <= _SAME * radii[0]
             table, count = _put_fan(
-                table, count, k, bary[k], corners[k], share[k], s, ws, t, wt
+                table, count, k, bary[k], corners[k], share[k], s, ws, t, wt,
+                radii if is_at_centre else everywhere,
             )  # fmt: skip
             continue
         top = 1
@@ -580,7 +632,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
             if level == levels:
                 table, count = _put_fans_around(
                     table, count, k, vertex, corner, fraction,
-                    tips[tip_of_part], s, ws, t, wt, one, one_corner,
+                    tips[tip_of_part], s, ws, t, wt, one, one_corner, everywhere,
                 )  # fmt: skip
                 continue
             for i in range(3):
