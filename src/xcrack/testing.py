@@ -161,9 +161,9 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, faults: list[str])
         faults.append(f"angle = {angle} is beyond ±π: it is in rad, positive towards the normal")
     mirror = np.array([1.0, -1.0, -1.0])[:modes]
     no_K = np.zeros_like(K)
-    closed, negative_K = K.copy(), K.copy()
-    closed[0, :, 0], negative_K[0, :, 0] = 0.0, -0.5
-    at_closed = _answer_of(criterion, closed, nu, faults)
+    K_of_closed, negative_K = K.copy(), K.copy()
+    K_of_closed[0, :, 0], negative_K[0, :, 0] = 0.0, -0.5
+    at_closed = _answer_of(criterion, K_of_closed, nu, faults)
     same_modes = {
         "states in another order": (K[::-1], (angle, dK, R)),
         "four times the load": (4 * K, (angle, 4 * dK, R)),

@@ -88,15 +88,15 @@ def test_points_are_spent_only_where_a_function_is_no_polynomial(order):
     )
     space, n_points = space_and_points(scene)
     cut = space.cuts[0]
-    beside = np.setdiff1d(space.enriched, cut.cells)
+    beside = np.setdiff1d(space.enriched_cells, cut.cells)
     pieces = len(cut.sub_to_cell) + len(beside)
     assert n_points == pieces * {1: 1, 2: 3}[order]
-    assert len(space.enriched) < len(scene.mesh.cells) / 3
+    assert len(space.enriched_cells) < len(scene.mesh.cells) / 3
     # With a tip: more points in its disc alone.
     space, n_points = space_and_points(problem(EDGE, order=order))
-    per_cell = n_points / len(space.enriched)
+    per_cell = n_points / len(space.enriched_cells)
     disc = space.has_tip.sum()
-    assert n_points <= 110 * disc + 3 * 3 * len(space.enriched)
+    assert n_points <= 110 * disc + 3 * 3 * len(space.enriched_cells)
     assert per_cell > 3
 
 

@@ -75,9 +75,9 @@ def test_points_are_spent_only_where_a_function_is_no_polynomial():
     """Heaviside cells: one point a piece; plain cells none; more only where a front is near."""
     solution = xc.solve(split_apart())
     space, cut = solution.space, solution.space.cuts[0]
-    beside = np.setdiff1d(space.enriched, cut.cells)
+    beside = np.setdiff1d(space.enriched_cells, cut.cells)
     assert points_of(solution) == len(cut.sub_to_cell) + len(beside)
-    assert len(space.enriched) < len(space.mesh.cells)
+    assert len(space.enriched_cells) < len(space.mesh.cells)
     plain, many = (
         xc.solve(problem(PENNY, numerics=xc.Numerics(enrichment="topological", points=n)))
         for n in (4, 6)
@@ -85,7 +85,7 @@ def test_points_are_spent_only_where_a_function_is_no_polynomial():
     # More points a direction change nothing in the cells without functions of a front.
     assert points_of(many) > points_of(plain)
     assert plain.space.has_tip.any()
-    assert (many.space.enriched == plain.space.enriched).all()
+    assert (many.space.enriched_cells == plain.space.enriched_cells).all()
 
 
 @pytest.mark.parametrize("linear", SOLVERS)

@@ -84,7 +84,7 @@ def test_an_uncracked_problem_is_plain_fem_to_the_last_bit(order):
     model = build(scene)
     assert (model.stiffness.toarray() == naive_stiffness(mesh, order, PLANE.lam, PLANE.mu)).all()
     assert model.n_points == 0
-    assert len(model.space.enriched) == 0
+    assert len(model.space.enriched_cells) == 0
     # The same linear system, solved by the same factorisation without anything of ours.
     solution = xc.solve(scene)
     free = ~model.imposed_values.is_fixed
@@ -139,7 +139,7 @@ def test_an_uncracked_body_is_plain_fem_to_the_last_bit():
     plain = naive_stiffness_3d(mesh, SOLID.lam, SOLID.mu)
     assert (model.stiffness.toarray() == plain).all()
     assert model.n_points == 0
-    assert len(model.space.enriched) == 0
+    assert len(model.space.enriched_cells) == 0
 
 
 def test_standard_entries_do_not_know_a_crack_in_space():

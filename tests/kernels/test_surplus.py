@@ -116,7 +116,7 @@ def test_residuals_and_blocks_of_a_cracked_body():
 def test_functionals_on_surplus_functions():
     space = cracked().space
     w = surplus(space, np.zeros(space.n_dof, dtype=bool))
-    points = cell_points(space, space.enriched[::3], 2, 2)
+    points = cell_points(space, space.enriched_cells[::3], 2, 2)
     factor = np.random.default_rng(743).normal(size=(len(points.cell), 2, 2, 2))
     result = np.zeros((len(w.is_fixed), 2, 2))
     add_functional(result, points.cell, points.bary, points.side, factor, *w.arrays)

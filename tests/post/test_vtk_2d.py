@@ -185,7 +185,7 @@ def test_level_sets_and_flags(tmp_path, pulled):
     enriched = np.concatenate(grid.cell_data["enriched"])
     assert set(np.unique(enriched)) == {0, 1, 2, 3}
     of_cell = enriched[np.argsort(np.concatenate(grid.cell_data["cell"]), kind="stable")]
-    assert (of_cell > 0).sum() > len(pulled.space.enriched)
+    assert (of_cell > 0).sum() > len(pulled.space.enriched_cells)
 
 
 def test_lips_are_those_of_contact(tmp_path, pressed):

@@ -27,7 +27,7 @@ def spaces():
 def test_gradients_are_those_of_the_values(number):
     space = list(spaces())[number]
     rng = np.random.default_rng(number)
-    for batch, _ in space.batches(space.enriched):
+    for batch, _ in space.batches(space.enriched_cells):
         row = np.repeat(np.arange(len(batch.cells)), 12)
         bary = 0.05 + 0.85 * rng.dirichlet(np.ones(3), len(row))
         nodes = space.mesh.cells[batch.cells[row]]
@@ -58,7 +58,7 @@ def test_shifted_functions_vanish_at_nodes(number):
     """
     space = list(spaces())[number]
     x = space.node_points
-    for batch, _ in space.batches(space.enriched):
+    for batch, _ in space.batches(space.enriched_cells):
         nodes = space.cell_nodes[batch.cells]
         for k in range(nodes.shape[1]):
             bary = np.zeros((len(batch.cells), 3))

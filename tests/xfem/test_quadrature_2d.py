@@ -58,7 +58,7 @@ def test_cells_are_filled_and_cubics_exact(tip):
     """The tip's cell included: its fan is exact for polynomials, which the patch tests need."""
     space = model([(-1.2, 0.03), tip]).space
     mesh = space.mesh
-    cells = space.enriched
+    cells = space.enriched_cells
     points = cell_points(space, cells, 4, 4)
     x = position(space, points.cell, points.bary)
     for powers in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (1, 2)):
@@ -108,7 +108,7 @@ def test_boundaries_of_pieces_close(tip):
     """The outward normals of each piece sum to zero: no facet or lip is missing or doubled."""
     built = model([(-1.2, 0.03), tip])
     space = built.space
-    cells = space.enriched[space.has_tip[space.enriched]]
+    cells = space.enriched_cells[space.has_tip[space.enriched_cells]]
     boundary = boundary_points(space, cells, built.lips)
     part = part_numbers(space, boundary.cell, boundary.side)
     piece = n_parts(space) * np.searchsorted(cells, boundary.cell) + part

@@ -38,7 +38,7 @@ def model(crack, n=6, seed=None, **options):
 
 
 def with_tip(space):
-    return space.enriched[space.has_tip[space.enriched]]
+    return space.enriched_cells[space.has_tip[space.enriched_cells]]
 
 
 def moments(space, cells, points):

@@ -43,7 +43,7 @@ def test_only_what_changed_is_integrated(scene, first, second, order):
     fresh = build(after)
     assert (retained.stiffness != fresh.stiffness).nnz == 0
     assert retained.n_points < fresh.n_points
-    simple = fresh.space.enriched[with_one_jump(fresh.space, fresh.space.enriched)]
+    simple = fresh.space.enriched_cells[with_one_jump(fresh.space, fresh.space.enriched_cells)]
     _, again = reused_cells(fresh.space, BODY, simple, retained.bulk.cells)
     assert again == 0
     _, changed = reused_cells(fresh.space, BODY, simple, build(before).bulk.cells)
@@ -56,13 +56,13 @@ def test_only_what_changed_is_integrated(scene, first, second, order):
 def test_a_node_that_lost_its_function(order):
     """Cells around it are integrated anew, all others taken over."""
     space_ = build(plane((0.1, 0.05), order)).space
-    cells = space_.enriched[with_one_jump(space_, space_.enriched)]
+    cells = space_.enriched_cells[with_one_jump(space_, space_.enriched_cells)]
     known, _ = reused_cells(space_, BODY, cells, None)
     nodes = space_.cell_nodes[cells]
     lost = np.array(space_.heaviside[0])
     lost[nodes[lost[nodes] >= 0][0]] = -1
     changed = replace(space_, heaviside=(lost,))
-    cells = changed.enriched[with_one_jump(changed, changed.enriched)]
+    cells = changed.enriched_cells[with_one_jump(changed, changed.enriched_cells)]
     result, used = reused_cells(changed, BODY, cells, known)
     fresh, every = reused_cells(changed, BODY, cells, None)
     np.testing.assert_array_equal(result.products, fresh.products)
@@ -73,7 +73,7 @@ def test_functions_jump_in_a_crossed_cell_only_where_it_is_cut():
     """What the key of a cell leaves out."""
     for problem in (plane((0.1, 0.05), 2), plane((0.31, -0.22), 1), space(0.2, 1)):
         space_ = build(problem).space
-        cells = space_.enriched[with_one_jump(space_, space_.enriched)]
+        cells = space_.enriched_cells[with_one_jump(space_, space_.enriched_cells)]
         cut = space_.cuts[0]
         np.testing.assert_array_equal(cut.is_cut[cells], cut.side[cells] == 0)
 
@@ -88,7 +88,9 @@ def test_another_crack_in_the_same_cells_is_integrated_anew():
     scene = plane((0.1, 0.05), 2)
     for cracks in ([shifted], [turned], [other, xc.line_crack([*ROOT, (0.1, 0.05)])]):
         changed = build(replace(scene, cracks=cracks))
-        cells = changed.space.enriched[with_one_jump(changed.space, changed.space.enriched)]
+        cells = changed.space.enriched_cells[
+            with_one_jump(changed.space, changed.space.enriched_cells)
+        ]
         _, used = reused_cells(changed.space, BODY, cells, known)
         _, every = reused_cells(changed.space, BODY, cells, None)
         assert used == every
@@ -109,7 +111,7 @@ def test_cells_with_tip_functions_or_two_cracks_are_not_reused():
     other = xc.line_crack([(1.2, -0.15), (0.0, -0.12)])
     problem = plane((0.1, 0.05), 2, [other])
     space_ = build(problem).space
-    simple = with_one_jump(space_, space_.enriched)
-    assert not space_.has_tip[space_.enriched[simple]].any()
-    one = np.isin(space_.signature[space_.enriched], [1, 2])
+    simple = with_one_jump(space_, space_.enriched_cells)
+    assert not space_.has_tip[space_.enriched_cells[simple]].any()
+    one = np.isin(space_.signature[space_.enriched_cells], [1, 2])
     np.testing.assert_array_equal(simple, one)

@@ -180,7 +180,7 @@ def solve_contact(
         displacements = (
             u
             if friction_solution is None
-            else np.concatenate([u, friction_solution.between], axis=1)
+            else np.concatenate([u, friction_solution.motion_between], axis=1)
         )
         pending_cracks = _overlapping_cracks(problem, model, displacements, spaces, trials)
     assert u is not None  # of the first look, or of the loop that it made begin

@@ -186,7 +186,7 @@ class SlipPoint:
         Since the state before.
     sets : int
         Sets tried since then, in the worst substep.
-    between : tuple of (share, lam)
+    tractions_between : tuple of (share, lam)
         Tractions of all substeps, and where they lie between the state before (0) and this one (1).
     at_rest : bool
         Nothing has acted so far.
@@ -198,7 +198,7 @@ class SlipPoint:
     status: Status
     dissipated: float = 0.0
     sets: int = 0
-    between: tuple[tuple[float, Floats], ...] = ()
+    tractions_between: tuple[tuple[float, Floats], ...] = ()
     at_rest: bool = False
 
 
@@ -355,14 +355,14 @@ class FrictionSolution:
         One for each crack with friction and multipliers.
     dissipated : tuple of float
         Energy since the state before.
-    between : (n_dof, k) array, length
+    motion_between : (n_dof, k) array, length
         Displacements of the substeps; none where nobody asked.
     """
 
     states: list[StateContact]
     work: list[FrictionWork]
     dissipated: tuple[float, ...]
-    between: Floats
+    motion_between: Floats
 
 
 def has_friction(problem: Problem, c: int) -> bool:
@@ -573,7 +573,7 @@ def _substep_displacements(
     loads, u_of_substeps = [], []
     previous_load = np.zeros(len(f)), np.zeros(len(f))
     for k, place in enumerate(places):
-        for share, lam in place.between[:-1]:
+        for share, lam in place.tractions_between[:-1]:
             loads.append(previous_load[0] + share * (f[:, k] - previous_load[0]) + N.T @ lam)
             u_of_substeps.append(previous_load[1] + share * (u_imposed[:, k] - previous_load[1]))
         previous_load = f[:, k], u_imposed[:, k]

@@ -71,12 +71,12 @@ class Forecast:
         return self.free is None or self.memory <= self.free
 
     def __str__(self) -> str:
-        free = "free memory is not known on this system"
+        memory_text = "free memory is not known on this system"
         if self.free is not None:
-            free = f"{_size(self.free)} are free" + ("" if self.fits else ": too little")
+            memory_text = f"{_size(self.free)} are free" + ("" if self.fits else ": too little")
         way = "conjugate gradients" if self.by_iteration else "a factorisation"
         number = f"about {_two_digits(self.unknowns)} unknowns at order {self.order}"
-        return f"{number}, and {_size(self.memory)} for {way}; {free}"
+        return f"{number}, and {_size(self.memory)} for {way}; {memory_text}"
 
 
 def forecast_of(problem: Problem, n_states: int = 1) -> Forecast:

@@ -69,7 +69,7 @@ def report(
                 f"to {imbalance:.1e}",
             )
         rows.append(row)
-    sharing = f"share one {engine.shared}" if n_states > 1 else f"one {engine.shared}"
+    sharing = f"share one {engine.shared_part}" if n_states > 1 else f"one {engine.shared_part}"
     rows.append(Ingredient("load states", True, f"{n_states}, {sharing}"))
     standard = model.space.n_nodes * d
     rows.append(
@@ -105,7 +105,7 @@ def report(
         "factorisations": engine.count.factorisations,
         "solves": engine.count.solves,
         **({"iterations": engine.count.iterations} if engine.reason else {}),
-        "assembled_cells": len(model.space.enriched),
+        "assembled_cells": len(model.space.enriched_cells),
         "integration_points": model.n_points,
         "multipliers": _n_multipliers(problem, contact.spaces),
         "contact_iterations": contact.sets,

@@ -214,7 +214,8 @@ def _solve_states(
         pairs = [(load, vectors[id(load)]) for load in all_loads]
         loads = on_mesh(model.space, pairs, model.bulk.loads)
     end_state = replace(
-        contact_solution.closed_sets(), bulk=replace(model.bulk, loads=loads, free=free_motions)
+        contact_solution.closed_sets(),
+        bulk=replace(model.bulk, loads=loads, free_motions=free_motions),
     )
     if contact_solution.friction_work:
         end_state = replace(
@@ -255,7 +256,7 @@ def _solve_states(
 
 def _fixed_unknowns(model: System, is_fixed: Bools) -> tuple[Bools, Floats]:
     """Fixed standard unknowns and the rigid motions left: those of the last solve, or new ones."""
-    space, earlier_free = model.space, model.bulk.free
+    space, earlier_free = model.space, model.bulk.free_motions
     standard = is_fixed[: space.n_nodes * space.dim]
     if earlier_free is not None and np.array_equal(earlier_free[0], standard):
         return earlier_free

@@ -146,7 +146,7 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
     root = read_tables(file, {str(key): value for key, value in (changes or {}).items()})
     root.check_names(_SECTIONS)
     problem = _problem(root)
-    solving, output = root.table("solve"), root.table("output")
+    solve_table, output = root.table("solve"), root.table("output")
     output.check_names(_OUTPUT)
     growth = _growth(root.table("growth")) if "growth" in root else None
     for name in ("life", "retarded", "inspection", "strength"):
@@ -157,12 +157,12 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
         path=file,
         title=root.text("title", file.stem),
         problem=problem,
-        states=load_states(solving, "states") if "states" in solving else None,
+        states=load_states(solve_table, "states") if "states" in solve_table else None,
         growth=growth,
         folder=file.parent / output.text("folder", f"{file.stem}_results"),
         pictures=tuple(_texts(output, "pictures")),
         warp=_number(output, "warp", 0.0),
-        solving=_solve_arguments(solving),
+        solving=_solve_arguments(solve_table),
         life=life_of(root.table("life"), problem, growth) if growth and "life" in root else None,
         inspection=inspection_of(root.table("inspection")) if "inspection" in root else None,
         strength=strength_of(root.table("strength"), problem, growth)

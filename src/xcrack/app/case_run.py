@@ -106,7 +106,7 @@ def run(
             f"run: {', '.join(surplus or ['keep_solutions'])} without a problem: give the problem "
             "too, for a run in a folder, or a case file alone."
         )
-    return _run_case(path, resumed=resumed, overwrite=overwrite)
+    return _run_case(path, is_resumed=resumed, overwrite=overwrite)
 
 
 def _run_in(
@@ -132,7 +132,7 @@ def _run_in(
     return resume(folder, problem, law, criterion, cycle, da, **options_of_collect, **options)
 
 
-def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> Any:
+def _run_case(path: str | PathLike[str], *, is_resumed: bool, overwrite: bool) -> Any:
     case = read_case(path)
     with system_errors("results cannot be written to", case.folder, error=ProblemError):
         case.folder.mkdir(parents=True, exist_ok=True)
@@ -144,7 +144,7 @@ def _run_case(path: str | PathLike[str], *, resumed: bool, overwrite: bool) -> A
             write(solution, case.folder / ("solution" if len(solutions) == 1 else f"state_{k}"))
     else:
         steps = case.folder / STEPS
-        result = growth_of_case(case, steps, is_resumed=resumed, overwrite=overwrite,
+        result = growth_of_case(case, steps, is_resumed=is_resumed, overwrite=overwrite,
                                 keep_solutions=case.keep_solutions)  # fmt: skip
         result.write(case.folder)
         _write_retarded(case, result)

@@ -334,7 +334,7 @@ def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -
     return tuple(items)
 
 
-def sound(kind: type[T], **fields: Any) -> T:
+def unchecked(kind: type[T], **fields: Any) -> T:
     """A frozen dataclass of fields that are sound by their making: none is checked.
 
     Parameters
@@ -353,7 +353,7 @@ def sound(kind: type[T], **fields: Any) -> T:
     return result
 
 
-def sound_copy(value: T, **fields: Any) -> T:
+def unchecked_copy(value: T, **fields: Any) -> T:
     """A frozen dataclass with other fields, that are sound by their making: none is checked again.
 
     Parameters

@@ -107,9 +107,12 @@ class Crack:
         """Of each tip in 2D: end, begin, length and direction of its face, hand of its frame."""
         x, frame = self._tips_and_frames
         begin = self.points[[1 if tip == 0 else tip - 1 for tip in self.tips or ()]]
-        along = x - begin
+        last_piece = x - begin
         (ahead_x, ahead_y), (normal_x, normal_y) = frame.transpose(1, 2, 0)
-        length, direction = np.linalg.norm(along, axis=1), np.arctan2(along[:, 1], along[:, 0])
+        length, direction = (
+            np.linalg.norm(last_piece, axis=1),
+            np.arctan2(last_piece[:, 1], last_piece[:, 0]),
+        )
         hand = np.sign(ahead_x * normal_y - ahead_y * normal_x)
         return x, lock(begin), lock(length), lock(direction), lock(hand)
 

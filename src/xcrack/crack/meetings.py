@@ -232,7 +232,7 @@ def _behind_tips(x: Floats, crack: Crack, room: float) -> Floats:
     return x
 
 
-def joined(
+def joined_cracks(
     cracks: Sequence[Crack], has_moved: Sequence[bool], meetings_made: Sequence[Meeting]
 ) -> list[Crack]:
     """Cracks after meetings: tips that end on others are none, facing ones are gone.
@@ -377,7 +377,7 @@ __all__ = [
     "Faces",
     "Meeting",
     "ends_on_others",
-    "joined",
+    "joined_cracks",
     "last_faces",
     "meetings",
     "moved_on",

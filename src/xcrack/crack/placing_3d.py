@@ -340,8 +340,8 @@ def _check_apart_from_itself(crack: Crack, body: Body) -> None:
     start, stop = origin + _OFF * way, origin + (1 - _OFF) * way
     hit, share = first_crossing(triangle_tree(x, faces), start, stop)
     end = start + share[:, None] * (stop - start)
-    shared = faces[owner][:, :, None] == faces[hit][:, None, :]
-    rows = np.nonzero((hit >= 0) & ~shared.any(axis=(1, 2)))[0]
+    is_common = faces[owner][:, :, None] == faces[hit][:, None, :]
+    rows = np.nonzero((hit >= 0) & ~is_common.any(axis=(1, 2)))[0]
     rows = rows[body.contains(end[rows]) & body.contains(start[rows])]
     for row, size in zip(rows.tolist(), body.cell_size(end[rows]).tolist(), strict=True):
         is_near = (np.linalg.norm(x - end[row], axis=1) <= _ALONG * size)[faces].any(axis=1)

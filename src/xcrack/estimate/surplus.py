@@ -265,8 +265,8 @@ def _reference() -> tuple[Floats, Floats]:
 
 def _derivative(power: tuple[int, ...], b: int, factor: float) -> tuple[tuple[int, ...], float]:
     """Derivative of a monomial with respect to L_b; factor 0 where it vanishes."""
-    lower = tuple(p - (k == b) for k, p in enumerate(power))
-    return (lower, factor * power[b]) if power[b] else (power, 0.0)
+    lower_power = tuple(p - (k == b) for k, p in enumerate(power))
+    return (lower_power, factor * power[b]) if power[b] else (power, 0.0)
 
 
 def _mean_of_monomial(power: Ints) -> float:

@@ -110,7 +110,7 @@ def law(
             f"law: no preset {value_text(name)}: give one of {', '.join(map(repr, presets))}."
         )
     units_of_model = Units.read(units)
-    if not units_of_model.consistent:
+    if not units_of_model.is_consistent:
         raise ProblemError(
             f"law: units = {value_text(units)}: K has the root of another length, which no model "
             f"has: give one length, such as m, MPa√m."
@@ -363,7 +363,7 @@ def material(
             f"xc.Isotropic and a law with values of your own."
         )
     target = Units.read(units)
-    if not target.consistent:
+    if not target.is_consistent:
         raise ProblemError(
             f"material: units = {value_text(units)}: K has the root of another length: {_MODEL}."
         )

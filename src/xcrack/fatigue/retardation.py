@@ -294,7 +294,7 @@ class CycleIntegration:
     grown_length: float
     zones: OverloadZones
 
-    def until(self, sigma: float) -> tuple[Floats, float]:
+    def growth_up_to(self, sigma: float) -> tuple[Floats, float]:
         """How far each place has come `(n,)`, and blocks, at some sigma."""
         arc = [np.interp(sigma, self.sigma, column) for column in self.arc.T]
         return np.array(arc), float(np.interp(sigma, self.sigma, self.cycles))
@@ -368,7 +368,7 @@ def march(
         values = np.where(root, rate ** (1 / exponent), np.log(np.maximum(rate, _SMALLEST)))
     threshold_range = np.array([getattr(one, "dK_th", 0.0) for one in models])[None, :, None]
     share = np.divide(threshold_range, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
-    since, size, zone_K = np.array(zones.since), np.array(zones.size), np.array(zones.K)
+    growth_since, size, zone_K = np.array(zones.since), np.array(zones.size), np.array(zones.K)
     arc, cycles_elapsed = np.zeros(x.shape), np.zeros(len(x))
     length_reached, position, part, _ = march_places(
         length,
@@ -386,7 +386,7 @@ def march(
         0 if first is None else 1 if isinstance(first, wheeler) else 2,
         np.array([getattr(one, "w", 1.0) for one in models]),
         np.array([getattr(one, "shutoff", 2.0) for one in models]),
-        since,
+        growth_since,
         size,
         zone_K,
         zones.position,
@@ -394,7 +394,7 @@ def march(
         arc,
         cycles_elapsed,
     )
-    zones_after = OverloadZones(since, size, zone_K, int(position), float(part))
+    zones_after = OverloadZones(growth_since, size, zone_K, int(position), float(part))
     sigma = np.linspace(0.0, length, len(x))
     return CycleIntegration(
         sigma, arc, cycles_elapsed / len(order), float(length_reached), zones_after

@@ -34,7 +34,7 @@ class Units:
     text: str
     length: float
     K: float
-    consistent: bool
+    is_consistent: bool
 
     @classmethod
     def read(cls, text: Any) -> "Units":

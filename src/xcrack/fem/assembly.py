@@ -300,23 +300,23 @@ class Stiffness:
     """
 
     body: sp.bsr_matrix
-    enriched: Enriched
+    enriched_blocks: Enriched
 
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers of rows and columns."""
-        n = (len(self.enriched.indptr) - 1) * self.enriched.data.shape[1]
+        n = (len(self.enriched_blocks.indptr) - 1) * self.enriched_blocks.data.shape[1]
         return n, n
 
     def __matmul__(self, x: Floats) -> Floats:
         """Forces `(n_dof,)` or `(n_dof, k)` of displacements of the same shape."""
-        return _product((self.body, self.enriched), x)
+        return _product((self.body, self.enriched_blocks), x)
 
     def sum_of_rows(self, rows: Bools | None = None) -> sp.csr_matrix:
         """The sum, of all rows or of some functions `(n_functions,)`; others are empty."""
         from xcrack.fem.kernels.stiffness import joined_blocks
 
-        body, blocks = self.body, self.enriched
+        body, blocks = self.body, self.enriched_blocks
         chosen_rows = np.ones(len(blocks.indptr) - 1, dtype=bool) if rows is None else rows
         entries = body.data.size + blocks.data.size
         kind = np.int32 if entries < np.iinfo(np.int32).max else np.int64
@@ -388,7 +388,7 @@ def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
     mask = space.signature[cells]
     one = (mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts))
     for joint in space.joints:
-        one &= ~joint.near[cells]
+        one &= ~joint.is_near[cells]
     return np.asarray(one)
 
 
@@ -496,7 +496,7 @@ class Bulk:
         Cut cells of the last crack that may serve the next.
     loads : tuple of MeshLoad
         Of the last solve, that do not act beside a crack.
-    free : (fixed, modes), optional
+    free_motions : (fixed, modes), optional
         Standard unknowns that supports decide, and the rigid motions that they leave free.
     """
 
@@ -506,7 +506,7 @@ class Bulk:
     matrix: sp.bsr_matrix
     cells: ReusedCells | None = None
     loads: tuple[MeshLoad, ...] = ()
-    free: tuple[Bools, Floats] | None = None
+    free_motions: tuple[Bools, Floats] | None = None
 
 
 def bulk(elasticity: Elasticity, order: int) -> Bulk:
@@ -572,7 +572,7 @@ def enriched_stiffness(
     """
     from xcrack.fem.kernels.stiffness import add_products, add_stiffness, enriched_pattern
 
-    cells, d = space.enriched, space.dim
+    cells, d = space.enriched_cells, space.dim
     if not len(cells):
         indptr, indices = np.zeros(space.n_functions + 1, np.int64), np.zeros(0, np.int32)
         return Enriched(indptr, indices, np.zeros((0, d, d))), 0, None

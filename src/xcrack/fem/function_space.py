@@ -165,7 +165,7 @@ class FunctionSpace:
             is_active = (has_jump & (is_on_other_side | cut.is_cut[cells, None])).any(axis=1)
             for joint in self.joints:
                 if joint.crack == c:
-                    is_active |= joint.near[cells]
+                    is_active |= joint.is_near[cells]
             mask[cells] |= is_active.astype(np.int64) << c
         for t, tip in enumerate(self.tips):
             cells = _with_any(tip.point_to_function >= 0, self.mesh.cells)
@@ -173,7 +173,7 @@ class FunctionSpace:
         return lock(mask)
 
     @cached_property
-    def enriched(self) -> Ints:
+    def enriched_cells(self) -> Ints:
         """Cells that are not plain."""
         return lock(np.nonzero(self.signature)[0])
 

@@ -54,7 +54,7 @@ def nodes_around_point(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools
     """Nodes in 2D that a junction may change, and those close to it `(nodes,)`."""
     size = space.mesh.cell_size[cells_around(space.mesh, joint.centre, 1e-9)].max()
     distance = np.linalg.norm(space.node_points - joint.centre, axis=1)
-    return _nodes_of(space, joint.near), distance < _BESIDE * size
+    return _nodes_of(space, joint.is_near), distance < _BESIDE * size
 
 
 def nodes_along_line(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:

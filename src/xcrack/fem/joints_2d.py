@@ -36,7 +36,7 @@ class Joint:
         Where the cracks meet.
     reach : float, length
         Around the centre; infinite in 3D.
-    near : (m,) array of bool
+    is_near : (m,) array of bool
         Cells in which sides are those of the junction.
     both : (m,) array of bool
         Cells cut by both cracks.
@@ -48,7 +48,7 @@ class Joint:
     x: Floats
     centre: Floats
     reach: float
-    near: Bools
+    is_near: Bools
     both: Bools
 
 

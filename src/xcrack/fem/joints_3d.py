@@ -103,8 +103,8 @@ def _check_clearance(mesh: Mesh, through_cut: Cut, ending: Cut, junction: Juncti
     """Raise where an arm at a small angle passes the front of the other crack too closely."""
     cells = np.nonzero(through_cut.is_tip)[0]
     distance = np.abs(ending.level_set.phi[mesh.cells[cells]].mean(axis=1))
-    along = ending.level_set.inside[mesh.cells[cells]].mean(axis=1)
-    close = (distance < _CLEAR * mesh.cell_size[cells]) & (along < 0)
+    level_inside = ending.level_set.inside[mesh.cells[cells]].mean(axis=1)
+    close = (distance < _CLEAR * mesh.cell_size[cells]) & (level_inside < 0)
     if close.any():
         k = int(np.nonzero(close)[0][np.argmin(distance[close])])
         middle = mesh.points[mesh.cells[cells[k]]].mean(axis=0)

@@ -410,7 +410,7 @@ def lip_side(space: FunctionSpace, c: int, cell: Ints, bary: Floats, side: int) 
     sides[:, c] = side
     for joint in space.joints:
         if joint.crack == c:
-            sides[joint.near[cell], joint.on] = joint.side
+            sides[joint.is_near[cell], joint.on] = joint.side
     return at_joints(space, cell, bary, sides, c)
 
 
@@ -433,7 +433,7 @@ def at_joints(
     for joint in space.joints:
         if joint.crack == c:
             continue
-        near_points = np.nonzero(joint.near[cell])[0]
+        near_points = np.nonzero(joint.is_near[cell])[0]
         side_of_through_crack = sides[near_points, joint.on]
         phi = space.cuts[joint.crack].level_set.phi[space.mesh.cells[cell[near_points]]]
         side_of_point = np.where(np.einsum("kb,kb->k", bary[near_points], phi) >= 0, 1, -1)

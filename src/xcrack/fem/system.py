@@ -42,14 +42,14 @@ class System:
     space: FunctionSpace
     lips: tuple[LipPoints, ...]
     bulk: Bulk
-    enriched: Enriched
+    enriched_blocks: Enriched
     imposed_values: ImposedValues
     n_points: int
 
     @cached_property
     def parts(self) -> Stiffness:
         """Stiffness of all unknowns, of body and enriched functions apart."""
-        return Stiffness(self.bulk.matrix, self.enriched)
+        return Stiffness(self.bulk.matrix, self.enriched_blocks)
 
     @cached_property
     def stiffness(self) -> Any:

@@ -11,7 +11,7 @@ from xcrack.base.arrays import Floats, Ints
 from xcrack.crack.advance_2d import advance
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts
-from xcrack.crack.meetings import LEAST, joined, meetings
+from xcrack.crack.meetings import LEAST, joined_cracks, meetings
 from xcrack.crack.placing_3d import place_arms
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth import fronts
@@ -96,7 +96,7 @@ def _advanced_lines(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     if rule.link_up is not None:
         return cracks
     meetings_now = [meeting for meeting in meetings(cracks, mesh) if meeting.is_soon]
-    return joined(cracks, (way > 0).tolist(), meetings_now) if meetings_now else cracks
+    return joined_cracks(cracks, (way > 0).tolist(), meetings_now) if meetings_now else cracks
 
 
 def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
@@ -135,8 +135,8 @@ def begin_at(
 
 def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """What the cracks after an advance mean for the cycles and for the next advance."""
-    since, growth_owed = _ENDS[rates.problem.mesh.dim].growth_since(rule, last, rates)
-    return _step_of_solve(rule, rates, identities, last.cycles + since, growth_owed)
+    way_since, growth_owed = _ENDS[rates.problem.mesh.dim].growth_since(rule, last, rates)
+    return _step_of_solve(rule, rates, identities, last.cycles + way_since, growth_owed)
 
 
 def _step_of_solve(

@@ -352,7 +352,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         tip=row,
         largest=largest,
     )
-    return plan.with_cracks(lambda: advanced(rule, step, way))
+    return plan.with_cracks(lambda: advanced_cracks(rule, step, way))
 
 
 def _arcs(step: Step, da: Floats) -> Floats:
@@ -366,7 +366,7 @@ def _arcs(step: Step, da: Floats) -> Floats:
     return way
 
 
-def advanced(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
+def advanced_cracks(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     """The cracks of a step after its stations have advanced."""
     stations, solves = solves_of(step)
     angle = _angle(stations, solves)
@@ -385,7 +385,7 @@ def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> li
     stations, solves = solves_of(step)
     growth = stations.growth(_rate(rule, solves), plan.largest)
     is_growing = growth >= WAITS_BELOW * plan.cell
-    return advanced(rule, step, _arcs(step, part * np.where(is_growing, growth, 0.0)))
+    return advanced_cracks(rule, step, _arcs(step, part * np.where(is_growing, growth, 0.0)))
 
 
 def advanced_crack(
@@ -719,10 +719,10 @@ def _kinds(solves: SolveHistory) -> BlockCycles:
 
 
 def _all_zones(parts: Sequence[OverloadZones]) -> OverloadZones:
-    since, size, K = (
+    growth_since, size, K = (
         np.concatenate([getattr(z, name) for z in parts]) for name in ("since", "size", "K")
     )
-    return OverloadZones(since, size, K, parts[0].position, parts[0].part)
+    return OverloadZones(growth_since, size, K, parts[0].position, parts[0].part)
 
 
 def _with_mean_rates(
@@ -825,9 +825,9 @@ def zones_onto(
         return replace(no_zones(len(x)), position=zones.position, part=zones.part)
     arc_within_zone = np.minimum(zones.since, arc)
     share = np.divide(arc_within_zone, arc, out=np.zeros_like(arc), where=arc > 0)
-    since = np.maximum(zones.since + share * (way - arc), 0.0)
+    growth_since = np.maximum(zones.since + share * (way - arc), 0.0)
     nearest = np.linalg.norm(x[:, None] - moved_x, axis=2).argmin(axis=1)
-    return replace(zones.at(nearest), since=since[nearest])
+    return replace(zones.at(nearest), since=growth_since[nearest])
 
 
 def _growth_ahead(
@@ -866,7 +866,7 @@ def _growth_ahead(
 
 __all__ = [
     "advance_of",
-    "advanced",
+    "advanced_cracks",
     "begin",
     "begin_at",
     "beyond_trapezoid",

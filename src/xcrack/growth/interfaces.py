@@ -55,7 +55,7 @@ class InterfacesAhead:
     """
 
     way: Floats
-    behind: Floats
+    way_behind: Floats
     set_before: Ints
     set_after: Ints
     is_smooth: Bools
@@ -74,7 +74,7 @@ class InterfacesAhead:
 
         Before it, and behind where that is too short a step.
         """
-        return np.where(self.stop < _SOON * self.cell, self.way + self.behind, self.stop)
+        return np.where(self.stop < _SOON * self.cell, self.way + self.way_behind, self.stop)
 
 
 def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhead | None:

@@ -124,17 +124,17 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     )
     pairs_near = [*pairs_beside, *faces]  # fronts that only touch have no face ahead
     joined_now, part = (
-        _joined_cracks(rule, _advanced(rule, step, plan, way), facing_pairs, pairs_near, body),
+        _joined_cracks(rule, _cracks_after(rule, step, plan, way), facing_pairs, pairs_near, body),
         1.0,
     )
     for lesser_part in (
-        _PARTS if joined_now.failed else ()
+        _PARTS if joined_now.failed_pairs else ()
     ):  # fronts that overlap may join while they are apart
-        cracks_before = _advanced(rule, step, plan, lesser_part * way)
+        cracks_before = _cracks_after(rule, step, plan, lesser_part * way)
         joined_sooner = _joined_cracks(
-            rule, cracks_before, facing_pairs, [*pairs_near, *joined_now.failed], body
+            rule, cracks_before, facing_pairs, [*pairs_near, *joined_now.failed_pairs], body
         )
-        if not joined_sooner.failed:
+        if not joined_sooner.failed_pairs:
             joined_now, part = joined_sooner, lesser_part
             break
     if joined_now.failure is not None:
@@ -144,10 +144,10 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     if not joined_now.places:
         return plan
     way, time, time_at_first_rate = part * way, part * time, part * time_at_first_rate
-    gain = _gain(step, joined_now.apart, rule.problem.mesh, m)
+    gain = _gain(step, joined_now.cracks_apart, rule.problem.mesh, m)
     area, area_apart, area_joined = (
         crack_areas(cracks, body.mesh)
-        for cracks in (step.corrected, joined_now.apart, joined_now.cracks)
+        for cracks in (step.corrected, joined_now.cracks_apart, joined_now.cracks)
     )
     led_on = _led_on(joined_now, area_apart, area_joined, bool(pairs_beside))
     if led_on > 0:
@@ -167,7 +167,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     ]
     return replace(
         plan, part=way, cycles=cycles, error=cycle_error, cracks=tuple(joined_now.cracks),
-        apart=tuple(joined_now.apart), joins=tuple(joins_of_step),
+        apart=tuple(joined_now.cracks_apart), joins=tuple(joins_of_step),
     )  # fmt: skip
 
 
@@ -177,20 +177,20 @@ class _Joined:
 
     Attributes
     ----------
-    apart, cracks : sequence of Crack
+    cracks_apart, cracks : sequence of Crack
         Before, and after.
     places : list of (pair of int, (3,) array)
         Which have met, and where, length.
-    failed : list of pair of int
+    failed_pairs : list of pair of int
         Which are too close to be solved, but could not join.
     failure : GeometryError or None
         Why two fronts could not become one.
     """
 
-    apart: Sequence[Crack]
+    cracks_apart: Sequence[Crack]
     cracks: Sequence[Crack]
     places: list[tuple[tuple[int, int], Floats]]
-    failed: list[tuple[int, int]]
+    failed_pairs: list[tuple[int, int]]
     failure: GeometryError | None = None
 
 
@@ -203,7 +203,7 @@ def _led_on(joined_now: _Joined, area_apart: Floats, area_joined: Floats, is_bes
         return float(area_joined.sum() - area_apart.sum())
     if len(area_apart) != len(area_joined):
         return 0.0
-    pairs = zip(joined_now.apart, joined_now.cracks, strict=True)
+    pairs = zip(joined_now.cracks_apart, joined_now.cracks, strict=True)
     is_host = np.array([one.ends_on == other.ends_on for one, other in pairs])
     return float((area_joined - area_apart)[is_host].sum())
 
@@ -272,7 +272,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         if facing_share is None:
             return None
         c, way, gap = facing_share
-        cracks_apart = _advanced(rule, step, plan, way)
+        cracks_apart = _cracks_after(rule, step, plan, way)
         crack = with_own_gap_closed(cracks_apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
         x, time = gap.x, way
     else:
@@ -280,7 +280,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         stations = solves_of(step)[0]
         moves = (stations.crack != c) | (stations.front != f)
         arc = np.where(moves, time * plan.arc, 0.0)
-        cracks_apart = _INTEGRATORS[rule.integrator].advanced(rule, step, arc)
+        cracks_apart = _INTEGRATORS[rule.integrator].advanced_cracks(rule, step, arc)
         crack, x = without_inner_front(cracks_apart[c], f)
     cracks_now = [crack if k == c else other for k, other in enumerate(cracks_apart)]
     cycles = time * plan.cycles
@@ -322,7 +322,7 @@ def _facing_share(
     """Crack whose fronts come to face each other, the share of the advance, and the gap then."""
 
     def nearest_gap(share: float) -> tuple[int, OwnGap] | None:
-        cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        cracks_now = plan.cracks if share == 1.0 else _cracks_after(rule, step, plan, share)
         gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(cracks_now)]
         open_gaps = [(c, gap) for c, gap in gaps if gap is not None]
         return min(open_gaps, key=lambda each: each[1].width, default=None)
@@ -349,11 +349,11 @@ def _facing_share(
     return None
 
 
-def _advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
+def _cracks_after(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
     return _INTEGRATORS[rule.integrator].partly_advanced(rule, step, plan, part)
 
 
-def joined(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+def correct_join(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
     """A step whose cracks have just joined: growth begins anew, after the cycles so far."""
     mesh, cycles_before = rates.problem.mesh, 0.0 if last.error is None else last.error.cycles
     plan = plan_of(last)
@@ -529,7 +529,7 @@ def _met_face(
     """
 
     def face_after(share: float) -> FaceAhead | None:
-        cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        cracks_now = plan.cracks if share == 1.0 else _cracks_after(rule, step, plan, share)
         if _cross(cracks_now, i, k, body):
             return FaceAhead(i, k, 0.0, 1.0, np.zeros(3))
         both = ((i, k), (k, i))
@@ -672,7 +672,7 @@ def _share(
     i, k = pair
 
     def excess(share: float) -> float:
-        cracks_now = plan.cracks if share == 1.0 else _advanced(rule, step, plan, share)
+        cracks_now = plan.cracks if share == 1.0 else _cracks_after(rule, step, plan, share)
         gap = gap_between(cracks_now[i], cracks_now[k], body, 10 * size + 2 * share * plan.largest)
         return np.inf if gap is None else gap.width / size - gap_left
 
@@ -738,4 +738,4 @@ def named_by_number(rule: GrowthRule) -> str:
     return ""
 
 
-__all__ = ["joined", "named_by_number", "with_joins"]
+__all__ = ["correct_join", "named_by_number", "with_joins"]

@@ -38,13 +38,13 @@ class Progress:
     def step(self, step: Step) -> None:
         """Tell of a step as soon as it is finished."""
         time_now = time.perf_counter()
-        since = 0.0 if self._cycles is None else step.cycles - self._cycles
+        new_cycles = 0.0 if self._cycles is None else step.cycles - self._cycles
         seconds = time_now - self._begin
         self._begin, self._cycles = time_now, step.cycles
         is_shown = _is_wanted(self.run)
         if not is_shown and not _LOG.isEnabledFor(logging.INFO):
             return
-        line, time_left = _line(self.run, step), _time_left(self.run, step, since, seconds)
+        line, time_left = _line(self.run, step), _time_left(self.run, step, new_cycles, seconds)
         _LOG.info("%s%s", line, time_left)
         if not is_shown:
             return

@@ -91,7 +91,7 @@ class Rates:
         Growth before and after the threshold of the run.
     R_range : (n, 2) array
         Smallest and largest ratio of the cycles of a block.
-    free : Response, optional
+    free_response : Response, optional
         Without contact, where the law asks for it.
     """
 
@@ -104,7 +104,7 @@ class Rates:
     law_rate: Floats
     rate: Floats
     R_range: Floats
-    free: Response | None = None
+    free_response: Response | None = None
 
     @property
     def sif(self) -> Answers:

@@ -7,7 +7,7 @@ from typing import Unpack
 
 import numpy as np
 
-from xcrack.base.checks import sound, sound_copy
+from xcrack.base.checks import unchecked, unchecked_copy
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.measures import crack_size
 from xcrack.crack.meetings import LEAST
@@ -257,7 +257,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
                 first = _with_validity(rule, first)
-            last = sound_copy(first, warnings=tuple(messages))
+            last = unchecked_copy(first, warnings=tuple(messages))
             progress.step(last)
             yield last
         else:
@@ -296,7 +296,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
             # Not kept with the step: a run that is resumed does not know the energy before.
             if alarm := alarm_of_energy(rule, cut, next_step):
                 warn(str(alarm))
-            last = sound_copy(next_step, warnings=tuple(messages))
+            last = unchecked_copy(next_step, warnings=tuple(messages))
             progress.step(last)
             yield last
             if end:
@@ -434,12 +434,14 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
     """A step with a shorter plan; the advance of its stations is reduced in proportion."""
-    shorter_step = _with_plan(rule, sound_copy(step, control=replace(step.control, length=length)))
+    shorter_step = _with_plan(
+        rule, unchecked_copy(step, control=replace(step.control, length=length))
+    )
     plan, plan_before = plan_of(shorter_step), plan_of(step)
     share = plan.largest / plan_before.largest if plan_before.largest > 0 else 1.0
     if rule.integrator == "euler":  # it recognises its stations by that, to round-off
-        return sound_copy(shorter_step, da=split(plan.arc, [len(da) for da in step.da]))
-    return sound_copy(shorter_step, da=tuple(share * da for da in step.da))
+        return unchecked_copy(shorter_step, da=split(plan.arc, [len(da) for da in step.da]))
+    return unchecked_copy(shorter_step, da=tuple(share * da for da in step.da))
 
 
 def _refuse(step: Step, end: str) -> None:
@@ -461,7 +463,7 @@ def _with_validity(rule: GrowthRule, step: Step) -> Step:
     """A step with how far elasticity holds at it; warns of what is beyond its limit."""
     if not step.has_left:  # by the material alone: a K_c of the run only says where it ends
         K_c = rule.problem.elasticity.material.K_c
-        step = sound_copy(step, validity=validity_of(rule, step, K_c))
+        step = unchecked_copy(step, validity=validity_of(rule, step, K_c))
     for alarm in alarms_of_step(rule, step):
         warn(str(alarm))
     return step
@@ -502,7 +504,7 @@ def _step_after(
             rule, problem, last, reuse, run_state(last).settings, joins_of_step
         )
         arrivals = arrivals_of(rule, last, arrivals_ahead, step.cycles - last.cycles)
-        return sound_copy(step, arrivals=arrivals), reuse, ""
+        return unchecked_copy(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
         return None, reuse, cannot_go_on(last, error)
     except XcrackError as error:
@@ -558,7 +560,7 @@ def _solved_step(
         N = 0.0 if last is None else last.cycles + plan_of(last).cycles
         response = respond_under_program(rule, problem, reuse, rule.estimates, N)
     sif, solutions, handed_on = response.sif, response.solutions, response.reuse
-    rates = rates_of(rule, problem, sound_copy(response, sif=best_K(sif)))
+    rates = rates_of(rule, problem, unchecked_copy(response, sif=best_K(sif)))
     integrator = integrator_of(rule)
     if last is None:
         index, radius = 0, rule.problem.numerics.radius
@@ -570,7 +572,7 @@ def _solved_step(
     else:
         index, radius = last.index + 1, run_state(last).radius
         identities = _identities(rule, last, problem, joins_of_step)
-        correct = joins_3d.joined if plan_of(last).joins else integrator.correct
+        correct = joins_3d.correct_join if plan_of(last).joins else integrator.correct
         result = correct(rule, last, rates, identities)
         for _ in range(_AGREES if rule.follows_cycles else 0):  # the cycles were foretold
             change = load_factor_at(rule, problem, result.cycles) / response.load_factor
@@ -578,12 +580,12 @@ def _solved_step(
                 break
             response = response.scaled(sqrt(change))  # half of it: fewer cycles, smaller loads
             sif, solutions = response.sif, response.solutions
-            rates = rates_of(rule, problem, sound_copy(response, sif=best_K(sif)))
+            rates = rates_of(rule, problem, unchecked_copy(response, sif=best_K(sif)))
             result = correct(rule, last, rates, identities)
     if rule.estimates:
         result = add_K_error(rule, last, result, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
-    step = sound(
+    step = unchecked(
         Step,
         index=index,
         cycles=result.cycles,
@@ -625,19 +627,19 @@ def _solved_step(
         )
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
-    return sound_copy(step, da=rates.split(da)), handed_on
+    return unchecked_copy(step, da=rates.split(da)), handed_on
 
 
 def _with_plan(rule: GrowthRule, step: Step) -> Step:
     """A step with the plan of what comes after it."""
     plan = integrator_of(rule).predict(rule, step)
-    step = sound_copy(step, plan=plan)
+    step = unchecked_copy(step, plan=plan)
     if plan.limit and (plan.limit != "geometry" or rule.problem.mesh.dim == 2):
         return step
     try:
-        return sound_copy(step, plan=with_joins(rule, step, plan))
+        return unchecked_copy(step, plan=with_joins(rule, step, plan))
     except GeometryError as error:
-        return sound_copy(step, plan=replace(plan, limit="geometry", refusal=str(error)))
+        return unchecked_copy(step, plan=replace(plan, limit="geometry", refusal=str(error)))
 
 
 def _identities(

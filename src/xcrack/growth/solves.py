@@ -339,10 +339,10 @@ class Stretch:
 
     def _up_to(self, length: float) -> "_Pieces":
         if self.integration is not None:
-            inside = self.integration.sigma < length
-            arc, cycles = self.integration.until(length)
-            sigma = np.append(self.integration.sigma[inside], length)
-            share = np.diff(np.vstack([self.integration.arc[inside], arc]), axis=0)
+            is_within = self.integration.sigma < length
+            arc, cycles = self.integration.growth_up_to(length)
+            sigma = np.append(self.integration.sigma[is_within], length)
+            share = np.diff(np.vstack([self.integration.arc[is_within], arc]), axis=0)
             s = self.start + 0.5 * (sigma[1:] + sigma[:-1])
             return _Pieces(self.solves.sigma, s, np.ones(len(share)), share, arc, cycles)
         s, weight = self.start + length * _POINTS, length * _WEIGHTS
@@ -371,8 +371,8 @@ class Stretch:
         """
         pieces, bend = self._all_pieces if length is None else self._up_to(length), self.solves.bend
         if bend.any():
-            smooth = angle - bend * np.sqrt(pieces.nodes[:, None])
-            theta = _sum(pieces.turns, smooth) + bend * np.sqrt(pieces.s[:, None])
+            smooth_angle = angle - bend * np.sqrt(pieces.nodes[:, None])
+            theta = _sum(pieces.turns, smooth_angle) + bend * np.sqrt(pieces.s[:, None])
         else:
             theta = _sum(pieces.turns, angle)
         growth_along, growth_across = (

@@ -133,11 +133,11 @@ def checked_joins(value: Sequence[Join], what: str) -> tuple[Join, ...]:
     ProblemError
         One of them is no `Join`.
     """
-    checked = entries(value, what)
-    for join in checked:
+    join_entries = entries(value, what)
+    for join in join_entries:
         if not isinstance(join, Join):
             raise ProblemError(f"{what}: {value_text(join)} is none: give a tuple of Join.")
-    return checked
+    return join_entries
 
 
 def numbers_after(n: int, joins_of_step: Sequence[Join], n_left: int) -> list[int]:

@@ -18,7 +18,7 @@ from xcrack.crack.meetings import (
     AHEAD,
     LEAST,
     Meeting,
-    joined,
+    joined_cracks,
     last_faces,
     meetings,
     moved_on,
@@ -205,12 +205,12 @@ def _up_to_boundary(
         longest_stretch = stretch_of(rule, stretch.solves, stretch.start, longer_length, zones)
         stretch = replace(longest_stretch, length=stretch.length)
 
-    def holds(length: float) -> bool:
+    def is_in_body(length: float) -> bool:
         return _is_inside(mesh, (stations.x + _growth(stations, stretch, length).move)[leaves])
 
-    if holds(longer_length):  # it runs along a side
+    if is_in_body(longer_length):  # it runs along a side
         return stretch, growth
-    length = bisected_length(holds, longer_length)[1]
+    length = bisected_length(is_in_body, longer_length)[1]
     return replace(stretch, length=length), _growth(stations, stretch, length)
 
 
@@ -261,7 +261,7 @@ def _step_to_meeting(
     growth, cycle_error = _as_gap_closes(step, growth, meetings_now)
     place = stations.x + growth.move
     cracks_apart, moves = with_tips_at(step.corrected, place, stations.fresh, plan.cell)
-    joined_cracks = joined(cracks_apart, moves.tolist(), meetings_now)
+    cracks_joined = joined_cracks(cracks_apart, moves.tolist(), meetings_now)
     return replace(
         plan,
         length=length,
@@ -269,7 +269,7 @@ def _step_to_meeting(
         arc=growth.arc,
         move=growth.move,
         moves=moves,
-        cracks=tuple(joined_cracks),
+        cracks=tuple(cracks_joined),
         apart=tuple(cracks_apart),
         error=cycle_error,
     )
@@ -645,7 +645,7 @@ def _corrected_points(
     by_places = _places(rule, last, solves, spans, frame, gap)
     known_error, newest_error = by_places.known_error, by_places.newest_error
     cycles, of_life = _cycles(rule, last, spans, growth)
-    lag = _OF_LENGTH * by_places.ahead / solves.scale
+    lag = _OF_LENGTH * by_places.errors_ahead / solves.scale
     lag_behind = error.behind + float(lag[0].max(initial=0.0))
     # What an end lags behind by after this step counts in all cycles that follow.
     whole_cycles = max(growth.cycles, PAST * last.cycles)
@@ -742,22 +742,26 @@ class _Spans:
 
 
 def _spans(rule: GrowthRule, last: Step, curve: Stretch) -> _Spans:
-    solves, old = curve.solves, solves_of(last)[1]
-    if old.n_solves == 1:
+    solves, solves_then = curve.solves, solves_of(last)[1]
+    if solves_then.n_solves == 1:
         return _Spans(curve, curve)
     line = stretch_of(rule, solves.last(2), curve.start, curve.length, last.zones)
-    if old.n_solves > 2 and last.zones is not None:
+    if solves_then.n_solves > 2 and last.zones is not None:
         return _Spans(curve, line)
-    begin, end = old.sigma[-2:].tolist()
+    begin, end = solves_then.sigma[-2:].tolist()
 
     def stretch_before(each: SolveHistory) -> Stretch:
         return stretch_of(rule, each, begin, end - begin, last.earlier_zones)
 
-    then = stretch_before(old)
+    then = stretch_before(solves_then)
     return _Spans(
         curve,
         line,
-        (then if old.n_solves == 2 else stretch_before(old.last(2)), then, stretch_before(solves)),
+        (
+            then if solves_then.n_solves == 2 else stretch_before(solves_then.last(2)),
+            then,
+            stretch_before(solves),
+        ),
     )
 
 
@@ -778,7 +782,7 @@ class _PlacesError:
     known_error: Floats
     newest_error: Floats
     own_error: Floats
-    ahead: Floats
+    errors_ahead: Floats
 
 
 def _places(
@@ -805,12 +809,12 @@ def _places(
 
     angle, old_angle = solves.angles(frame), old_solves.angles(frame)
     move_now = spans.curve.growth(frame, angle).move - spans.line.growth(frame, angle[-2:]).move
-    line, then, new = spans.of_step_before
-    move = then.growth(frame, old_angle).move
-    move_before = new.growth(frame, angle).move - move
+    by_last_two, by_solves_then, by_solves_now = spans.of_step_before
+    move = by_solves_then.growth(frame, old_angle).move
+    move_before = by_solves_now.growth(frame, angle).move - move
     ratio, move_length = np.ones(len(size)), np.linalg.norm(move_before, axis=1)
     if old_solves.n_solves > 2:
-        move_error = np.linalg.norm(move - line.growth(frame, old_angle[-2:]).move, axis=1)
+        move_error = np.linalg.norm(move - by_last_two.growth(frame, old_angle[-2:]).move, axis=1)
         length_ratio = plan.length / float(solves.sigma[-2] - solves.sigma[-3])
         ratio = np.divide(length_ratio * move_length, move_error, out=ratio, where=move_error > 0)
         ratio = np.clip(ratio, *_RATIOS_OF_PLACE)
@@ -866,8 +870,11 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
         return _CyclesError(line_error, line_error + cycles_before, 0.0)
 
     share = share_left(rule)
-    line, then, new = (span.arcs()[1] for span in spans.of_step_before)
-    error_before, error_now = share * abs(then - line), abs(then - new)
+    by_last_two, by_solves_then, by_solves_now = (span.arcs()[1] for span in spans.of_step_before)
+    error_before, error_now = (
+        share * abs(by_solves_then - by_last_two),
+        abs(by_solves_then - by_solves_now),
+    )
     length_ratio = plan_of(last).length / float(old_solves.sigma[2] - old_solves.sigma[1])
     newest_error = line_error * (
         float(np.clip(length_ratio * error_now / error_before, *_RATIOS))
@@ -877,11 +884,14 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
     if (
         old_solves.sigma[0] == 0
     ):  # the first step of all is spanned by one parabola: the next is prolonged
-        line, then, new = (
+        by_last_two, by_solves_then, by_solves_now = (
             Stretch(each, 0.0, float(old_solves.sigma[1]), rule.threshold).arcs()[1]
             for each in (old_solves.first(2), old_solves, spans.curve.solves)
         )
-        prolonged_error, error_before = _RATIO_OF_PROLONGED * abs(then - new), abs(then - line)
+        prolonged_error, error_before = (
+            _RATIO_OF_PROLONGED * abs(by_solves_then - by_solves_now),
+            abs(by_solves_then - by_last_two),
+        )
         error_now += min(prolonged_error, _RATIO_OF_FIRST * share * error_before)
     return _CyclesError(newest_error, error_now, newest_error)
 
@@ -939,12 +949,12 @@ def _exit(rule: GrowthRule, last: Step, stretch_ahead: Stretch, lost_rows: Ints)
     if _is_inside(mesh, (stations.x + plan.move)[lost_rows]):
         return plan.length
 
-    def holds(length: float) -> bool:
+    def is_in_body(length: float) -> bool:
         return _is_inside(
             mesh, (stations.x + _growth(stations, stretch_ahead, length).move)[lost_rows]
         )
 
-    return bisected_length(holds, plan.length)[1]
+    return bisected_length(is_in_body, plan.length)[1]
 
 
 def _is_inside(mesh: Mesh, x: Floats) -> bool:

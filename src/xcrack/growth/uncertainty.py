@@ -219,7 +219,7 @@ def _rates_of_moved_K(
 ) -> list[list[tuple[Floats, Floats]]]:
     """Directions and rates with each mode of K moved by its bars, up and down."""
     n_modes = rates.sif[0][0].K.shape[1] if rates.sif and rates.sif[0] else 0
-    if isinstance(rule.cycle, Spectrum) or rates.free is not None:
+    if isinstance(rule.cycle, Spectrum) or rates.free_response is not None:
         return [
             [_moved_rates(rule, rates, bar, mode, sign) for sign in _SIGNS]
             for mode in range(n_modes)
@@ -255,8 +255,8 @@ def _moved_rates(
         )
 
     free_response = None
-    if rates.free is not None:
-        free_response = replace(rates.free, sif=moved_by_bars(rates.free.sif))
+    if rates.free_response is not None:
+        free_response = replace(rates.free_response, sif=moved_by_bars(rates.free_response.sif))
     with collected_warnings([]):  # they are of cracks that nobody has
         response = replace(rates.response, sif=moved_by_bars(rates.sif))
         other = rates_of(rule, rates.problem, response, free_response)

@@ -89,9 +89,9 @@ def pardiso(A: sp.csc_matrix) -> Solve:
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)
-    upper = sp.triu(A, format="csr")
-    solver.factorize(upper)
-    return lambda b: np.asarray(solver.solve(upper, np.ascontiguousarray(b)))
+    upper_triangle = sp.triu(A, format="csr")
+    solver.factorize(upper_triangle)
+    return lambda b: np.asarray(solver.solve(upper_triangle, np.ascontiguousarray(b)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ class DirectSystem:
     tree: Tree | None = None
     hand_on: bool = False
     count: SolveCount = field(default_factory=SolveCount)
-    shared: str = "factorisation"
+    shared_part: str = "factorisation"
     reason: str = ""
 
     def solve(

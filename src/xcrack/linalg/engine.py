@@ -215,7 +215,7 @@ class Engine(Protocol):
     def count(self) -> SolveCount: ...  # noqa: D102
 
     @property
-    def shared(self) -> str: ...  # noqa: D102
+    def shared_part(self) -> str: ...  # noqa: D102
 
     @property
     def reason(self) -> str: ...  # noqa: D102

@@ -202,7 +202,7 @@ class IterativeSystem:
     block_basis: sp.csr_matrix | None = None
     inverse_basis: sp.csr_matrix | None = None
     count: SolveCount = field(default_factory=SolveCount)
-    shared: str = "multigrid hierarchy"
+    shared_part: str = "multigrid hierarchy"
     reason: str = "conjugate gradients: a large body in 3D"
 
     def solve(

@@ -441,16 +441,16 @@ def _over_linear(
 ) -> tuple[tuple[GridLevel, ...], Floats]:
     """Quadratic functions over the levels of the linear ones, which they contain."""
     mesh, d = bulk_.mesh, bulk_.mesh.dim
-    lower = hierarchy(bulk(bulk_.elasticity, 1), is_fixed)
+    linear_levels = hierarchy(bulk(bulk_.elasticity, 1), is_fixed)
     half = 0.5 * stars(mesh, 2)
     half.setdiag(1.0)
     P = sp.kron(half.T.tocsr(), sp.identity(d))
     P = sp.bsr_matrix(
-        sp.diags(~is_fixed * 1.0) @ P @ sp.diags(lower.is_free * 1.0), blocksize=(d, d)
+        sp.diags(~is_fixed * 1.0) @ P @ sp.diags(linear_levels.is_free * 1.0), blocksize=(d, d)
     )
     single_blocks = finest_blocks.in_single_precision()
     top = _level(single_blocks, diagonal, largest_eigenvalue(single_blocks, diagonal), P)
-    return (top, *lower.levels), lower.coarse_inverse
+    return (top, *linear_levels.levels), linear_levels.coarse_inverse
 
 
 def extended_cycle(

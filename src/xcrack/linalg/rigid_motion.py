@@ -70,7 +70,7 @@ def free_motion(
     if free_motions.shape[1] == 0:
         return Motion(modes, np.zeros(0, dtype=np.int64))
     is_standard = np.ones(space.n_nodes, dtype=bool)
-    is_standard[space.cell_nodes[space.enriched]] = False
+    is_standard[space.cell_nodes[space.enriched_cells]] = False
     is_standard[space.mesh.n_points :] = False
     every = np.zeros(space.n_nodes, dtype=bool)
     every[: space.mesh.n_points] = True

@@ -592,7 +592,7 @@ class _Builder:
                                 - g.first].ravel() for g in groups]  # fmt: skip
                 members = np.unique(np.concatenate([np.zeros(0, np.int64), *rows])).tolist()
             nodes.add(line, name, members)
-        return nodes.named, elements.named
+        return nodes.set_by_key, elements.set_by_key
 
     def surfaces(
         self,
@@ -656,7 +656,7 @@ class _SetTable:
         self, what: str, numbers: dict[tuple[str, int], int], instances: tuple[str, ...]
     ) -> None:
         self.what, self.numbers, self.instances = what, numbers, instances
-        self.named: dict[tuple[str, str], NamedSet] = {}
+        self.set_by_key: dict[tuple[str, str], NamedSet] = {}
 
     def add(self, line: DeckLine, name: str, members: list[int] | None) -> None:
         keyword = line.keyword
@@ -669,15 +669,17 @@ class _SetTable:
                     parts += [self.members(entry, line, number) for entry in entries if entry]
             members = np.concatenate(parts).tolist()
         key = (line.instance, name.casefold())
-        earlier_set = self.named.get(key)
+        earlier_set = self.set_by_key.get(key)
         earlier_members = [] if earlier_set is None else earlier_set.members.tolist()
-        self.named[key] = NamedSet(
+        self.set_by_key[key] = NamedSet(
             name if earlier_set is None else earlier_set.name,
             np.array(list(dict.fromkeys([*earlier_members, *members])), dtype=np.int64),
         )
 
     def members(self, entry: str, line: DeckLine, number: int | None) -> Ints:
-        return _members(entry, line, number, self.numbers, self.named, self.what, self.instances)
+        return _members(
+            entry, line, number, self.numbers, self.set_by_key, self.what, self.instances
+        )
 
     def _generated_numbers(self, line: DeckLine, number: int, entries: list[str]) -> Ints:
         keyword = line.keyword

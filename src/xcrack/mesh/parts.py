@@ -104,11 +104,11 @@ def selector(where: Where, dim: int, what: str) -> Callable[[Floats], Bools]:
     """A function of points by a box or a user's function, checked."""
     if callable(where):
         return lambda x: _values_at(where, x, what)
-    lower, upper = box_of(where, dim, what)
-    ends = np.concatenate([lower, upper])
+    low_corner, high_corner = box_of(where, dim, what)
+    ends = np.concatenate([low_corner, high_corner])
     reach = 1e-9 * np.abs(ends[np.isfinite(ends)]).max(initial=0.0)  # a box may be flat
-    lower, upper = lower - reach, upper + reach
-    return lambda x: np.asarray(((x >= lower) & (x <= upper)).all(axis=1))
+    low_corner, high_corner = low_corner - reach, high_corner + reach
+    return lambda x: np.asarray(((x >= low_corner) & (x <= high_corner)).all(axis=1))
 
 
 def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
@@ -131,12 +131,13 @@ def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
     padded = [[0.0 if v is None else v for v in corner] for corner in corners]
     rows = numbers(padded, f"{what}: corners of the box", (2, dim), error=MeshError)
     is_open = np.array([[v is None for v in corner] for corner in corners])
-    lower, upper = np.where(is_open, [[-np.inf], [np.inf]], rows)
-    if (lower > upper).any():
+    low_corner, high_corner = np.where(is_open, [[-np.inf], [np.inf]], rows)
+    if (low_corner > high_corner).any():
         raise MeshError(
-            f"{what}: the box from {lower.tolist()} to {upper.tolist()} is inside out: swap them."
+            f"{what}: the box from {low_corner.tolist()} to {high_corner.tolist()} is inside out: "
+            "swap them."
         )
-    return lower, upper
+    return low_corner, high_corner
 
 
 def _values_at(function: Callable[[Floats], Any], x: Floats, what: str) -> Bools:

@@ -462,7 +462,7 @@ def _to_size(mesh: Mesh, size_at: Callable[[Floats, Ints], Floats], sweeps: int 
 
 def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
     """Wanted size of cells, checked as it is asked for."""
-    what, lower = "the size of refine", FINEST * mesh.extent
+    what, least_size = "the size of refine", FINEST * mesh.extent
     function = size if callable(size) else None
 
     def size_at(centre: Floats, parent: Ints) -> Floats:
@@ -474,12 +474,12 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
                 "for each."
             )
         value = np.broadcast_to(value, len(centre))
-        is_invalid = ~(value >= lower)
+        is_invalid = ~(value >= least_size)
         if is_invalid.any():
             i = int(np.argmax(is_invalid))
             raise MeshError(
                 f"{what} is {value[i]:g} at {at(centre[i])} ({int(is_invalid.sum())} such cells): "
-                f"it must be a length, no less than a millionth of the body ({lower:.3g})."
+                f"it must be a length, no less than a millionth of the body ({least_size:.3g})."
             )
         return value
 

@@ -319,10 +319,13 @@ def _is_box(selector: Any) -> bool:
 def _within_box(corners: Any, what: str) -> Callable[[Floats], Bools]:
     """A selector by two corners, in the plane of a sheet also of two numbers each."""
     n = 2 if len(corners[0]) == 2 else 3
-    lower, upper = box_of(corners, n, what)
-    reach = _ON_BOX * np.where(np.isfinite(upper - lower), upper - lower, 0.0).max()
+    low_corner, high_corner = box_of(corners, n, what)
+    reach = (
+        _ON_BOX
+        * np.where(np.isfinite(high_corner - low_corner), high_corner - low_corner, 0.0).max()
+    )
     return lambda x: np.asarray(
-        ((x[:, :n] >= lower - reach) & (x[:, :n] <= upper + reach)).all(axis=1)
+        ((x[:, :n] >= low_corner - reach) & (x[:, :n] <= high_corner + reach)).all(axis=1)
     )
 
 

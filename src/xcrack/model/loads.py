@@ -155,7 +155,9 @@ class displacement(Load, Support):  # noqa: N801 - it is used as a function
     """
 
     where: Annotated[str | ArrayLike, Place(unit=LENGTH)]
-    value: Annotated[ArrayLike | Callable[..., ArrayLike], VectorField(unit=LENGTH, free=True)]
+    value: Annotated[
+        ArrayLike | Callable[..., ArrayLike], VectorField(unit=LENGTH, may_be_free=True)
+    ]
     acts = frozenset({"support"})
     is_listed = False
 

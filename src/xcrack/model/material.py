@@ -580,12 +580,16 @@ class ScaledMaterial(Material):
     """
 
     def __init__(self, graded_material: Material, factor: Floats) -> None:
-        self.graded, self.unit_material, self.factor = graded_material, graded_material.unit, factor
+        self.graded_material, self.unit_material, self.factor = (
+            graded_material,
+            graded_material.unit,
+            factor,
+        )
         self.plane = graded_material.plane
 
     def expansion(self, x: Floats) -> Any:
         """Coefficient of thermal expansion at the points."""
-        return self.graded.expansion(x)
+        return self.graded_material.expansion(x)
 
     def tensor(self, dim: int) -> Floats:
         """Stiffness at the points `(q, dim, dim, dim, dim)`, stress."""

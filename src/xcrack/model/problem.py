@@ -24,7 +24,7 @@ from xcrack.base.arguments import (
     Whole,
     check_arguments,
 )
-from xcrack.base.checks import entries, number, sound_copy, value_text
+from xcrack.base.checks import entries, number, unchecked_copy, value_text
 from xcrack.base.errors import CoarseMeshError, ProblemError, XcrackError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
@@ -431,10 +431,10 @@ def problem_with_cracks(
     """
     numerics = problem.numerics
     if radius is not None and radius != numerics.radius:
-        numerics = sound_copy(numerics, radius=radius)
+        numerics = unchecked_copy(numerics, radius=radius)
     if len(cracks) != len(problem.cracks):
         return replace(problem, cracks=tuple(cracks), numerics=numerics)
-    result = sound_copy(problem, cracks=tuple(cracks), numerics=numerics)
+    result = unchecked_copy(problem, cracks=tuple(cracks), numerics=numerics)
     vars(result)["elasticity"] = problem.elasticity
     return result
 

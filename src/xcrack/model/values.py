@@ -23,14 +23,14 @@ class VectorField(Rule):
     """
 
     unit: Unit = NUMBER
-    free: bool = False
+    may_be_free: bool = False
     is_vector = True
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The function, a read-only vector, or a tuple with None."""
         if callable(value):
             return value
-        is_sequence = self.free and isinstance(value, list | tuple)
+        is_sequence = self.may_be_free and isinstance(value, list | tuple)
         if is_sequence and len(value) in (2, 3) and all(v is None for v in value):
             raise error(f"{what} = {value_text(value)}: give a number in one direction or more.")
         if is_sequence and any(v is None or callable(v) for v in value) and len(value) in (2, 3):

@@ -496,23 +496,23 @@ def recompute_rates(
         )
     with np.errstate(invalid="ignore"):
         share = cycles_of(rows.a[first], rate[first]) / cycles_of(rows.a[first], rows.rate[first])
-    since = rows.cycles[rows.step[first]] * share
+    new_cycles = rows.cycles[rows.step[first]] * share
     is_broken = np.isinf(rate[first]).any(axis=1)
     end = ""
     if is_broken.any():
         last = int(np.argmax(is_broken))
-        since = since[: last + 1]
+        new_cycles = new_cycles[: last + 1]
         end = f"the law returns inf in step {last}: its toughness is reached"
-    bound = bound_of_shares(rows, rate[:, 0], since)
+    bound = bound_of_shares(rows, rate[:, 0], new_cycles)
     if bound > _MOST:
         raise ProblemError(
             f"rerate: by this law the tips would have shared the advance another way, by "
             f"{bound:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run it with "
             "the law."
         )
-    factor = np.concatenate([scale[:1, 0], scale[: len(since), 1]])
+    factor = np.concatenate([scale[:1, 0], scale[: len(new_cycles), 1]])
     return RecomputedRates(
-        np.concatenate([[0.0], np.cumsum(since)]) + steps[0].cycles, bound, end, factor
+        np.concatenate([[0.0], np.cumsum(new_cycles)]) + steps[0].cycles, bound, end, factor
     )
 
 
@@ -541,7 +541,7 @@ def check_block(
         )
 
 
-def bound_of_shares(rows: DrivingForce, new_rates: Floats, since: Floats) -> float:
+def bound_of_shares(rows: DrivingForce, new_rates: Floats, new_cycles: Floats) -> float:
     """Mean over the cycles of the largest change of an advance over that of the driving place.
 
     Parameters
@@ -553,8 +553,8 @@ def bound_of_shares(rows: DrivingForce, new_rates: Floats, since: Floats) -> flo
         Cycles by them of the steps that are reached.
     """
     old_rates, first = rows.rate[:, 0], np.unique(rows.step)
-    worst = np.zeros(len(since))
-    for n, step in enumerate(first[: len(since)].tolist()):
+    worst = np.zeros(len(new_cycles))
+    for n, step in enumerate(first[: len(new_cycles)].tolist()):
         is_of_step = rows.step == step
         lead = is_of_step & rows.is_driving
         with np.errstate(invalid="ignore"):
@@ -566,8 +566,8 @@ def bound_of_shares(rows: DrivingForce, new_rates: Floats, since: Floats) -> flo
         worst[n] = np.nan_to_num(
             change * rows.da[is_of_step] / rows.da[lead], nan=0.0, posinf=1.0
         ).max()
-    total = since.sum()
-    return float(worst @ since / total) if total else 0.0
+    total = new_cycles.sum()
+    return float(worst @ new_cycles / total) if total else 0.0
 
 
 __all__ = [

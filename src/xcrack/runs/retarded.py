@@ -57,7 +57,7 @@ class Retarded:
         return float(self.blocks[-1])
 
     @property
-    def broken(self) -> bool:
+    def is_broken(self) -> bool:
         """Whether the crack comes to its end: the last step, or the toughness."""
         return self.ended in ("", _BREAKS)
 
@@ -110,7 +110,7 @@ def retarded(
     check(history, law, spectrum, model)
     limit = number(max_blocks, "retarded: max_blocks", above=0)
     nu = number(nu, "retarded: nu", above=-1, below=0.5)
-    return CycledPath.of(history, spectrum, nu).grown(law, model, limit)
+    return CycledPath.of(history, spectrum, nu).grown_by(law, model, limit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +163,7 @@ class CycledPath:
         K = np.stack([ends[0][0], *(each[1] for each in ends)])
         return cls(rows, a, size, K, order, threshold)
 
-    def grown(
+    def grown_by(
         self, law: Law, model: Retardation | None, limit: float, factor: float | Floats = 1.0
     ) -> Retarded:
         """Growth cycle by cycle, with K times a factor, of each step where it is an array."""
@@ -315,7 +315,7 @@ class RetardedLives:
     @property
     def life(self) -> float:
         """Blocks with nothing varied."""
-        return self._blocks(self.path.grown(self.law, self.model, self.limit))
+        return self._blocks(self.path.grown_by(self.law, self.model, self.limit))
 
     def lives(self, samples: Samples, n: int) -> Floats:
         """Blocks of each sample `(n,)`; inf for those that do not end."""
@@ -325,7 +325,7 @@ class RetardedLives:
         N = np.empty(n)
         for k in range(n):
             law = varied_law(self.law, {name: float(samples[name][k]) for name in names})
-            path = self.path.grown(_times(law, float(C[k])), self.model, self.limit, stretch[k])
+            path = self.path.grown_by(_times(law, float(C[k])), self.model, self.limit, stretch[k])
             N[k] = self._blocks(path)
         return N
 
@@ -333,13 +333,13 @@ class RetardedLives:
         """Largest change of the life with all K larger or smaller by their spread."""
         life, share = self.life, self.path.rows.spread.max(axis=1)
         return max(
-            abs(self._blocks(self.path.grown(self.law, self.model, self.limit, 1 + s * share))
+            abs(self._blocks(self.path.grown_by(self.law, self.model, self.limit, 1 + s * share))
                 - life) / life
             for s in (-1.0, 1.0)
         )  # fmt: skip
 
     def _blocks(self, path: Retarded) -> float:
-        return path.life if path.broken else float("inf")
+        return path.life if path.is_broken else float("inf")
 
 
 def _times(law: Law, factor: float) -> Law:

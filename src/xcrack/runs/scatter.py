@@ -422,12 +422,12 @@ def _cycles_by_rates(lead: DrivingForce, rate: Floats, size: Floats | None) -> F
     blocks = lead.cycles / cycles_of(lead.a, lead.rate)
     if size is not None:
         a, rate = _steps_from_size(a, rate, size)
-    since = cycles_of(a, rate) * blocks
+    cycles = cycles_of(a, rate) * blocks
     is_broken = np.isinf(rate[..., 0]) | np.isinf(rate[..., 1])
     is_after_break = (
         np.cumsum(is_broken, axis=-1) - is_broken > 0
     )  # steps after the toughness was reached
-    return np.asarray(np.where(is_after_break, 0.0, since).sum(axis=-1))
+    return np.asarray(np.where(is_after_break, 0.0, cycles).sum(axis=-1))
 
 
 def _steps_from_size(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import sound
+from xcrack.base.checks import unchecked
 from xcrack.fem.assembly import Tabulated, tabulate_functions
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Circles, Points, cell_points
@@ -180,12 +180,12 @@ def tip_intensities(
         return _largest_difference(solutions, ends, result)
 
     order = solutions[0].space.order
-    agree, near = _AGREE[order], _AGREE_BESIDE[order]
+    agreement, agreement_beside = _AGREE[order], _AGREE_BESIDE[order]
     doubts = []
     for t, (parts, domain) in zip(ends, result, strict=True):
         doubts += check(
-            solutions, t, domain, parts, lambda: agree == 0 or difference() > agree,
-            lambda: near == 0 or difference() > near,
+            solutions, t, domain, parts, lambda: agreement == 0 or difference() > agreement,
+            lambda: agreement_beside == 0 or difference() > agreement_beside,
         )  # fmt: skip
     return [parts for parts, _ in result], doubts
 
@@ -248,7 +248,7 @@ def intensity_at_tip(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], 
     for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
         K = 0.5 * E_prime * values[:, :2]
         T = E_prime * values[0, 2] + constant_part(solution, t)
-        sif = sound(
+        sif = unchecked(
             SIF,
             x=tip.x[None],
             frame=tip.frame[None],

@@ -60,8 +60,8 @@ def before_junctions(space: FunctionSpace, crack: int, points: Points) -> Bools:
     result = np.ones(len(points.cell), dtype=bool)
     for joint in space.joints:
         if joint.crack == crack:
-            inside = space.cuts[joint.on].level_set.inside[space.mesh.cells[points.cell]]
-            is_ahead = np.einsum("qb,qb->q", inside, points.bary) > 0
+            level_inside = space.cuts[joint.on].level_set.inside[space.mesh.cells[points.cell]]
+            is_ahead = np.einsum("qb,qb->q", level_inside, points.bary) > 0
             result &= is_ahead | (points.side[:, joint.on] == joint.side)
     return result
 

@@ -144,10 +144,10 @@ def plot(
         plane=cast(Plane | None, clip),
         view=view,
         loads=loads,
-        near=None,
+        near_box=None,
     )
     if zoom is not None:
-        look = replace(look, near=crack_box(solution, look.cracks(solution), zoom, look.warp))
+        look = replace(look, near_box=crack_box(solution, look.cracks(solution), zoom, look.warp))
     if field in _ON_LIPS and not solution.lips:
         raise ProblemError(f'plot(field="{field}"): the body has no crack; draw another field.')
     target = picture_path(file, "plot")
@@ -168,7 +168,7 @@ class PlotStyle:
     plane: Plane | None
     view: Floats | None
     loads: bool
-    near: Floats | None
+    near_box: Floats | None
 
     def colours(self, is_signed: bool) -> Any:
         """The colour map, or one that suits the values."""
@@ -196,17 +196,17 @@ def _draw_2d(
     if field == "mesh":
         from xcrack.view.matplotlib import draw_mesh
 
-        return draw_mesh(solution, target, window, look.title, look.near)
-    if look.near is not None and renderer == "pyvista":
+        return draw_mesh(solution, target, window, look.title, look.near_box)
+    if look.near_box is not None and renderer == "pyvista":
         raise ProblemError("plot(zoom=): in 2D matplotlib alone can cut off: leave renderer out.")
-    if look.near is not None:
+    if look.near_box is not None:
         renderer = "matplotlib"
     fault = "" if renderer == "matplotlib" else _fault_of_pyvista(target)
     if renderer == "pyvista" and fault:
         raise ProblemError(
             f'plot(renderer="pyvista"): {fault}; or leave renderer out, and matplotlib draws it.'
         )
-    picture = replace(scene(solution, field, look.warp, look.limits), focus_box=look.near)
+    picture = replace(scene(solution, field, look.warp, look.limits), focus_box=look.near_box)
     if renderer == "matplotlib" or fault:
         from xcrack.view import matplotlib as plot_matplotlib
 
@@ -252,8 +252,8 @@ def _draw_3d(
         )
     else:
         picture = space_scene(solution, field, look.warp, look.limits, look.plane, look.view)
-    if look.near is not None:
-        corners = np.stack(np.meshgrid(*look.near.T), axis=-1).reshape(-1, 3)
+    if look.near_box is not None:
+        corners = np.stack(np.meshgrid(*look.near_box.T), axis=-1).reshape(-1, 3)
         picture = replace(picture, focus_points=corners)
     arrows = None
     if look.loads:

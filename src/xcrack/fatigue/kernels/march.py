@@ -38,7 +38,7 @@ def march_places(  # type: ignore[no-untyped-def]
     model,
     w,
     shutoff,
-    since,
+    growth_since,
     size,
     zone_K,
     position,
@@ -95,7 +95,7 @@ def march_places(  # type: ignore[no-untyped-def]
     cycles_elapsed : float
         Cycles.
     """
-    n, n_cycles, n_points, n_shifts = len(since), len(order), len(arc), values.shape[3]
+    n, n_cycles, n_points, n_shifts = len(growth_since), len(order), len(arc), values.shape[3]
     spacing = length / (n_points - 1)
     growth, sum_of = np.zeros(n), np.zeros(n)
     length_reached, cycles_elapsed, block, cycles_in_block, rows_filled = 0.0, 0.0, 0.0, 0, 1
@@ -114,16 +114,16 @@ def march_places(  # type: ignore[no-untyped-def]
                 K += at * K_max[k, i, kind]
             K = max(K, 0.0)
             zone_size = zone[i] * K * K
-            if model > 0 and since[i] + zone_size >= size[i]:
-                since[i], size[i], zone_K[i] = 0.0, zone_size, K
+            if model > 0 and growth_since[i] + zone_size >= size[i]:
+                growth_since[i], size[i], zone_K[i] = 0.0, zone_size, K
             low, fraction = 0, 0.0
-            if model == 2 and K > 0 and since[i] < size[i]:
+            if model == 2 and K > 0 and growth_since[i] < size[i]:
                 threshold = 0.0
                 for k in range(K_max.shape[0]):
                     at = weight[row, k, i] + x * (weight[row + 1, k, i] - weight[row, k, i])
                     threshold += at * share[k, i, kind]
                 phi = max(0.0, 1.0 - threshold) / (shutoff[i] - 1.0)
-                reduction = phi * (zone_K[i] * np.sqrt(1.0 - since[i] / size[i]) - K)
+                reduction = phi * (zone_K[i] * np.sqrt(1.0 - growth_since[i] / size[i]) - K)
                 place = min(max(reduction / K, 0.0), 1.0) * (n_shifts - 1)
                 low = min(int(place), n_shifts - 2)
                 fraction = place - low
@@ -133,8 +133,8 @@ def march_places(  # type: ignore[no-untyped-def]
                     weight, line, x, row, values, is_root, exponent, i, kind, low + 1
                 )
                 rate += fraction * (other - rate)
-            if model == 1 and since[i] + zone_size < size[i]:
-                rate *= (zone_size / (size[i] - since[i])) ** w[i]
+            if model == 1 and growth_since[i] + zone_size < size[i]:
+                rate *= (zone_size / (size[i] - growth_since[i])) ** w[i]
             growth[i] = rate
             largest = max(largest, rate)
         cycles_left = min(1.0 - part, most_cycles - cycles_elapsed)
@@ -162,7 +162,7 @@ def march_places(  # type: ignore[no-untyped-def]
             rows_filled += 1
         for i in range(n):
             sum_of[i] += cycles_done * growth[i]
-            since[i] += cycles_done * growth[i]
+            growth_since[i] += cycles_done * growth[i]
         cycles_elapsed += cycles_done
         block += length_after - length_reached
         length_reached = length_after

@@ -129,8 +129,8 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
     size, factors, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
     factors[0], factors[1] = 1.0, -1.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R
-    lower, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
-    transpose, right_side = lower + 2, lower + 3
+    lower_letter, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
+    transpose, right_side = lower_letter + 2, lower_letter + 3
     one, minus_one = factors.ctypes.data, factors.ctypes.data + 8
     rows, pivots, rest, info = (
         size.ctypes.data,
@@ -166,13 +166,13 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
             if _factored_panel(panel[t], m, k) != 0:
                 return 1
         else:
-            dpotrf(lower, pivots, panel[t], rows, info)
+            dpotrf(lower_letter, pivots, panel[t], rows, info)
             if size[3] != 0:
                 return 1
             if b > 0:
                 dtrsm(
                     right_side,
-                    lower,
+                    lower_letter,
                     transpose,
                     no_transpose,
                     rest,
@@ -191,7 +191,7 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
                 )
         elif k > 0 and b > 0:
             dsyrk(
-                lower,
+                lower_letter,
                 no_transpose,
                 rest,
                 pivots,
@@ -238,7 +238,7 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
     size[3] = 1
     factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
     letter[0], letter[1], letter[2] = 76, 78, 84  # L N T
-    lower, no_transpose, transpose = (
+    lower_letter, no_transpose, transpose = (
         letter.ctypes.data,
         letter.ctypes.data + 1,
         letter.ctypes.data + 2,
@@ -257,7 +257,7 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
         if k == 0:
             continue
         size[0], size[1], size[2] = k, k + b, b
-        dtrsv(lower, no_transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
+        dtrsv(lower_letter, no_transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
         if b > 0:
             dgemv(
                 no_transpose,
@@ -296,7 +296,7 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
                 x0 + 8 * low,
                 step,
             )
-        dtrsv(lower, transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
+        dtrsv(lower_letter, transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
     return letter[0] == 76 and factors[0] == 1.0  # which keeps both alive until here
 
 
@@ -320,8 +320,8 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
     size, factors, letter = np.empty(4, np.int32), np.empty(3), np.empty(4, np.uint8)
     factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82
-    lower, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
-    transpose, right_side = lower + 2, lower + 3
+    lower_letter, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
+    transpose, right_side = lower_letter + 2, lower_letter + 3
     one, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
     columns, pivots, rows, rest = (
         size.ctypes.data,
@@ -351,7 +351,7 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
             # Rows of X, (k, r) in C order, are a matrix (r, k) by columns: X <- X L^-T.
             dtrsm(
                 right_side,
-                lower,
+                lower_letter,
                 transpose,
                 no_transpose,
                 columns,
@@ -412,7 +412,7 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
                 )
             dtrsm(
                 right_side,
-                lower,
+                lower_letter,
                 no_transpose,
                 no_transpose,
                 columns,
@@ -488,7 +488,7 @@ def bisect_cells(ranking, centre, cells, n_points, depth):  # type: ignore[no-un
     leaf = np.empty(n, dtype=np.int64)
     low, high = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     high[0] = n
-    lower = np.empty(n, dtype=np.bool_)
+    is_lower = np.empty(n, dtype=np.bool_)
     buffer = np.empty(n, dtype=np.int64)
     for _ in range(depth):
         m = len(low)
@@ -503,14 +503,14 @@ def bisect_cells(ranking, centre, cells, n_points, depth):  # type: ignore[no-un
             if b - a < 2:
                 continue
             for k in range(a, b):
-                lower[ranking[axis, k]] = k < half
+                is_lower[ranking[axis, k]] = k < half
             for i in range(d):
                 if i == axis:
                     continue
                 one, other = a, 0
                 for k in range(a, b):
                     c = ranking[i, k]
-                    if lower[c]:
+                    if is_lower[c]:
                         ranking[i, one] = c
                         one += 1
                     else:

@@ -514,26 +514,26 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
     table, count, number, vertex, corner, share, tip, s, ws, t, wt, fan, fan_corner, circles
 ):
     """Points of two fans around the place of a triangle that is nearest to a tip outside it."""
-    best, along, least = 0, 0.0, np.inf
+    nearest_row, best_at, least_distance = 0, 0.0, np.inf
     for i in range(3):
         j = (i + 1) % 3
         dx, dy = corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1]
         x, y = tip[0] - corner[i, 0], tip[1] - corner[i, 1]
         at = min(max((x * dx + y * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
         distance = math.hypot(x - at * dx, y - at * dy)
-        if distance < least:
-            best, along, least = i, at, distance
-    i, j, k = best, (best + 1) % 3, (best + 2) % 3
+        if distance < least_distance:
+            nearest_row, best_at, least_distance = i, at, distance
+    i, j, k = nearest_row, (nearest_row + 1) % 3, (nearest_row + 2) % 3
     for half in range(2):
-        part = along if half == 0 else 1 - along
+        part = best_at if half == 0 else 1 - best_at
         j2, j3 = k if half == 0 else j, i if half == 0 else k
         if part <= 1e-14:
             continue
         for b in range(3):
-            fan[0, b] = (1 - along) * vertex[i, b] + along * vertex[j, b]
+            fan[0, b] = (1 - best_at) * vertex[i, b] + best_at * vertex[j, b]
             fan[1, b], fan[2, b] = vertex[j2, b], vertex[j3, b]
         for b in range(2):
-            fan_corner[0, b] = (1 - along) * corner[i, b] + along * corner[j, b]
+            fan_corner[0, b] = (1 - best_at) * corner[i, b] + best_at * corner[j, b]
             fan_corner[1, b], fan_corner[2, b] = corner[j2, b], corner[j3, b]
         table, count = _put_fan(
             table, count, number, fan, fan_corner, share * part, s, ws, t, wt, circles
@@ -620,13 +620,13 @@ def triangle_points(  # type: ignore[no-untyped-def]
                         vertex[i, b] += part[i, v] * bary[k, v, b]
                     for j in range(2):
                         corner[i, j] += part[i, v] * corners[k, v, j]
-            size, tip_of_part, least = _longest_side(corner), 0, np.inf
+            size, tip_of_part, least_distance = _longest_side(corner), 0, np.inf
             for m in range(len(tips)):
                 distance = _distance(tips[m, 0], tips[m, 1], corner)
-                if distance < least:
-                    tip_of_part, least = m, distance
+                if distance < least_distance:
+                    tip_of_part, least_distance = m, distance
             # Equal lengths are common in regular meshes: round-off must not decide.
-            if size <= (1.0 + _SAME) * least:
+            if size <= (1.0 + _SAME) * least_distance:
                 table, count = _put_rule(table, count, k, vertex, fraction, near, near_share)
                 continue
             if level == levels:

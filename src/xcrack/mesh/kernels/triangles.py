@@ -8,14 +8,17 @@ LEAF = 4  # boxes a leaf of the tree
 
 
 @kernel
-def _is_before(item, other, lower, upper, axis):  # type: ignore[no-untyped-def]
+def _is_before(item, other, low_corners, high_corners, axis):  # type: ignore[no-untyped-def]
     """Whether the middle of a box comes before that of another one; equal ones by number."""
-    a, b = lower[item, axis] + upper[item, axis], lower[other, axis] + upper[other, axis]
+    a, b = (
+        low_corners[item, axis] + high_corners[item, axis],
+        low_corners[other, axis] + high_corners[other, axis],
+    )
     return a < b or (a == b and item < other)
 
 
 @kernel
-def _halve(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-def]
+def _halve(order, first, last, low_corners, high_corners, axis):  # type: ignore[no-untyped-def]
     """Exchange a stretch of items until none before its middle is behind one from there on.
 
     Hoare's selection: no half is sorted, so that all of the tree takes the time of one sort.
@@ -23,16 +26,16 @@ def _halve(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-d
     half, last = (first + last) // 2, last - 1
     while first < last:
         a, b, pivot = order[first], order[last], order[(first + last) // 2]
-        low, high = (a, b) if _is_before(a, b, lower, upper, axis) else (b, a)
-        if _is_before(pivot, low, lower, upper, axis):
+        low, high = (a, b) if _is_before(a, b, low_corners, high_corners, axis) else (b, a)
+        if _is_before(pivot, low, low_corners, high_corners, axis):
             pivot = low
-        elif _is_before(high, pivot, lower, upper, axis):
+        elif _is_before(high, pivot, low_corners, high_corners, axis):
             pivot = high
         i, j = first, last
         while i <= j:
-            while _is_before(order[i], pivot, lower, upper, axis):
+            while _is_before(order[i], pivot, low_corners, high_corners, axis):
                 i += 1
-            while _is_before(pivot, order[j], lower, upper, axis):
+            while _is_before(pivot, order[j], low_corners, high_corners, axis):
                 j -= 1
             if i <= j:
                 order[i], order[j] = order[j], order[i]
@@ -46,7 +49,7 @@ def _halve(order, first, last, lower, upper, axis):  # type: ignore[no-untyped-d
 
 
 @kernel
-def box_tree(lower, upper):  # type: ignore[no-untyped-def]
+def box_tree(low_corners, high_corners):  # type: ignore[no-untyped-def]
     """Tree of boxes by halving at the median of the longest side.
 
     Parameters
@@ -63,7 +66,7 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
     low, high : (q, 3) arrays
         Box of each node.
     """
-    k = len(lower)
+    k = len(low_corners)
     order = np.arange(k)
     node = np.empty((2 * k + 1, 3), np.int64)
     low = np.empty((2 * k + 1, 3))
@@ -79,9 +82,9 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
             middle_low, middle_high = np.inf, -np.inf
             for place in range(first, last):
                 i = order[place]
-                bottom = min(bottom, lower[i, d])
-                top = max(top, upper[i, d])
-                middle = lower[i, d] + upper[i, d]
+                bottom = min(bottom, low_corners[i, d])
+                top = max(top, high_corners[i, d])
+                middle = low_corners[i, d] + high_corners[i, d]
                 middle_low = min(middle_low, middle)
                 middle_high = max(middle_high, middle)
             low[at, d], high[at, d] = bottom, top
@@ -89,7 +92,7 @@ def box_tree(lower, upper):  # type: ignore[no-untyped-def]
                 width, axis = middle_high - middle_low, d
         node[at, 0] = -1
         if last - first > LEAF:
-            _halve(order, first, last, lower, upper, axis)
+            _halve(order, first, last, low_corners, high_corners, axis)
             half = (first + last) // 2
             node[at, 0] = nodes_in_use
             node[nodes_in_use, 1], node[nodes_in_use, 2] = first, half
