@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack.meetings import joined, meetings
+from xcrack.crack.meetings import joined_cracks, meetings
 
 STEEL = xc.Isotropic(210e3, 0.3, "strain")
 PULL = [xc.traction("top", (0, 100.0)), xc.traction("bottom", (0, -100.0))]
@@ -126,6 +126,6 @@ def test_a_tip_that_comes_to_another_tip_ends_a_cell_behind_it():
     cracks = placed([[(0, 10.05), (9.5, 10.05)], [(10.2, 9.9), (10.2, 15.0)]])
     (own,) = [met for met in meetings(cracks, mesh) if met.tip == 0]
     assert own.x[1] > 10.05 + 0.5
-    ended = joined(cracks, [False] * 3, [own])
+    ended = joined_cracks(cracks, [False] * 3, [own])
     assert ended[0].tips == ()
     np.testing.assert_array_equal(ended[0].points[-1], own.x)
