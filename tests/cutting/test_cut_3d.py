@@ -141,3 +141,59 @@ def test_front_cells_hold_the_front():
     )
     scale = 1e-9 * mesh.cell_size[cut.sub_to_cell[at]]
     assert ((psi.min(axis=1) >= -scale) | (psi.max(axis=1) <= scale)).all()
+
+
+def ruled(first, last, n):
+    """A surface between two polylines `(m, 3)`, n faces wide."""
+    points = np.stack([(1 - t) * first + t * last for t in np.linspace(0, 1, n + 1)], axis=1)
+    number = np.arange(points[..., 0].size).reshape(points.shape[:2])
+    a, b, c, d = (
+        part.ravel()
+        for part in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])
+    )
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return xc.surface_crack(points.reshape(-1, 3), faces)
+
+
+def hook(angle):
+    """A sheet through a box whose front heads for its own face, three cells before it."""
+    turn = np.radians(angle)
+    end = np.array([-0.04, 0.2])
+    back = end + 0.42 * np.array([np.cos(turn), np.sin(turn)])
+    corners = np.array([(-0.7, -0.1), (0.76, -0.1), (0.76, back[1]), back, end])
+    length = np.append(0, np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1)))
+    s = np.union1d(np.linspace(0, length[-1], 24), length)
+    x, z = (np.interp(s, length, line) for line in corners.T)
+    return ruled(*(np.stack([x, np.full(len(s), y), z], axis=1) for y in (-0.5, 0.5)), 5)
+
+
+def helix(rise, gap):
+    """A C whose ends lie beside each other, by a rise, over an angle of twice a gap."""
+    angle = np.linspace(gap, 2 * np.pi - gap, 61)
+    z = 0.03 + rise * (angle / (2 * np.pi) - 0.5)
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    up = np.stack([0 * z, 0 * z, z], axis=1)
+    return ruled(0.33 * circle + up, 0.57 * circle + up, 4)
+
+
+@pytest.mark.parametrize(
+    ("crack", "cells", "off"),
+    [
+        (hook(50), (18, 5, 11), 0.025),
+        pytest.param(hook(60), (18, 5, 11), 0.025, marks=pytest.mark.slow),
+        (helix(0.06, 0.35), (11, 11, 7), 0.011),
+        pytest.param(helix(0.1, 0.35), (11, 11, 7), 0.011, marks=pytest.mark.slow),
+    ],
+    ids=["hook 50", "hook 60", "helix 0.06", "helix 0.1"],
+)
+def test_faces_come_before_prolongations_of_the_same_crack(crack, cells, off):
+    """Area over which cells are cut; a hook loses .15 of a cell at each of its sharp corners.
+
+    While what is nearest decided it was .84 and .91 of that of hooks, .77 and .84 of the others.
+    """
+    size = np.array(cells) / 15  # half of the box: cells of .133
+    built = model(xc.box(-size, size, cells), crack)
+    area = xc.measures(built.problem.placed[0], built.problem.mesh).area
+    cut = float(built.lips[0].weight.sum())
+    print(f"\ncut over {cut / area:.4f} of the area")
+    assert cut == pytest.approx(area, rel=off)

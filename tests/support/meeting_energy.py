@@ -35,15 +35,27 @@ def release(step, E, nu):
     )
 
 
-def unbalanced(steps, E, nu):
-    """What of the energy of each step after the first no release over the new area explains."""
+def released(steps, E, nu):
+    """Energy of each step after the first, what it has more than the one before, and that by K."""
     result = []
     for one, other in zip(steps, steps[1:]):
         rates, sizes = [release(step, E, nu) for step in (one, other)], [areas(one), areas(other)]
         if len(rates[0]) != len(rates[1]):  # some have become one
             rates = [np.array([g @ a / a.sum()]) for g, a in zip(rates, sizes, strict=True)]
             sizes = [a.sum(keepdims=True) for a in sizes]
-        released = 0.5 * (rates[0] + rates[1]) @ (sizes[1] - sizes[0])
+        by_K = 0.5 * (rates[0] + rates[1]) @ (sizes[1] - sizes[0])
         energy = other.solutions[-1].energy
-        result.append((energy - one.solutions[-1].energy - released) / energy)
-    return np.array(result)
+        result.append((energy, energy - one.solutions[-1].energy, by_K))
+    return np.array(result).T
+
+
+def unbalanced(steps, E, nu):
+    """What of the energy of each step after the first no release over the new area explains."""
+    energy, more, by_K = released(steps, E, nu)
+    return (more - by_K) / energy
+
+
+def cut_shares(step):
+    """Area over which the cells are cut by each crack, over that of its faces in the body."""
+    lips = np.array([lips.weight.sum() for lips in step.solutions[-1].lips])
+    return lips / areas(step)

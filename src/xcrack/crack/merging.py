@@ -30,6 +30,7 @@ _NEAR = 1.1  # cells between two fronts of a crack below which they join
 _WIDE = 2.0  # cells between two ends of fronts behind a hole below which they join
 _FACES = 0.3  # cosine between the direction ahead of a front and another one that it meets
 _STRAIGHT = 0.8  # cosine, or share of a radius, from which on fronts face each other
+_SMALLER = (1.0, 0.7, 0.5)  # of the radius of a disc: those tried one after the other
 _LOOSE = 3.0  # radii from the end of an open front within which the other one ends too
 
 
@@ -262,7 +263,8 @@ def with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> 
         With fronts.
     x : (3,) array, length
     radius : float, length
-        Of the disc that closes the gap.
+        Of the disc that closes the gap; a smaller one does where this one is as large as the hollow
+        of a front beside the gap.
     size : float, length
         Spacing of new front points.
 
@@ -271,6 +273,15 @@ def with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> 
     GeometryError
         Not two pieces of fronts face each other there, or the gap cannot be closed.
     """
+    for share in _SMALLER:
+        try:
+            return _with_own_gap_closed(crack, x, share * radius, size)
+        except GeometryError as error:
+            failure = error
+    raise failure
+
+
+def _with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> Crack:
     tree, parts = triangle_tree(crack.points, crack.faces), []
     fronts = front_frames(crack)
     for f, front in enumerate(fronts):

@@ -1,5 +1,6 @@
 """Level sets of one crack at the points of a mesh, and what both dimensions do to them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.placing_2d import ON_MESH
-from xcrack.mesh.distances import TriangleTree, front_distance, signed_in, triangle_tree
+from xcrack.mesh.distances import TriangleTree, closest_in, front_distance, signed_in, triangle_tree
 from xcrack.mesh.locate import cells_around
 from xcrack.mesh.mesh import Mesh, local_facets
 from xcrack.mesh.simplex import boxes_meet, simplex_rule
@@ -200,6 +201,9 @@ def _unit(v: Floats) -> Floats:
 # Strips of triangles that prolong cracks in 3D ahead of their fronts, for their level sets.
 
 _FAN = np.radians(30.0)  # a front that turns away by more gets rays between
+_NEARER = 0.8  # of the way from its front: what of a prolongation is nearer to a face is none
+_BESIDE = 0.3  # of the distance to a front, which another prolongation lies beside that of its own
+_AHEAD = 0.05  # of a triangle: no more of a crack lies ahead of fronts that are nowhere hollow
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,18 +218,25 @@ class ExtendedSurface:
         First the faces of the crack.
     label : (k,) array of int
         0 for a face of the crack, f + 1 for the strip ahead of front f.
+    base : (k, 3) array, length
+        Of a triangle of a strip a place on the front where it comes from.
+    faces : TriangleTree or None
+        The faces of the crack, if a strip has been cut short before some of them.
     """
 
     points: Floats
     triangles: Ints
     label: Ints
+    base: Floats
+    faces: TriangleTree | None
 
 
 def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
     """A placed crack with a strip of triangles ahead of each front, tangential to it.
 
     Where a front is hollow the rays of the strip cross; what would be turned over is left out,
-    and parts may lie over each other. Where it is sharp, rays fan out.
+    and parts may lie over each other. Where it is sharp, rays fan out. A strip ends where it comes
+    closer to faces of the crack, or to another front that it passes beside, than to its own front.
 
     Parameters
     ----------
@@ -242,6 +253,8 @@ def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
     """
     points, triangles = [crack.points], [crack.faces]
     label = [np.zeros(len(crack.faces), dtype=np.int64)]
+    bases = [crack.points[crack.faces[:, 0]]]
+    tree, is_short = None, False
     n_points = len(crack.points)
     edges, owner = rim(crack.faces)
     side_normal = dict(
@@ -271,12 +284,47 @@ def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
         is_upright = (
             np.einsum("ij,ij->i", face_normals(all_points, faces), unit(expected_normal)) > 0.2
         )
-        triangles.append(faces[is_upright])
-        label.append(np.full(int(is_upright.sum()), f + 1))
+        faces = faces[is_upright]
+        start = np.full(reference.shape, np.nan)
+        start[base] = origin
+        start[n_points : n_points + len(n) * layers] = np.repeat(origin, layers, axis=0)
+        place = np.nanmean(start[faces], axis=1)
+        if _lies_ahead(crack.points, origin, direction, _AHEAD * edge):
+            tree = tree or triangle_tree(crack.points, crack.faces)
+            is_beyond = _is_beyond(tree, all_points[faces].mean(axis=1), place)
+            is_short |= bool(is_beyond.any())
+            faces, place = faces[~is_beyond], place[~is_beyond]
+        triangles.append(faces)
+        label.append(np.full(len(faces), f + 1))
+        bases.append(place)
         n_points += len(strip_points)
-    return ExtendedSurface(
-        lock(np.concatenate(points)), lock(np.concatenate(triangles)), lock(np.concatenate(label))
-    )
+    x, faces, labels, places = (lock(np.concatenate(a)) for a in (points, triangles, label, bases))
+    return ExtendedSurface(x, faces, labels, places, tree if is_short else None)
+
+
+def _lies_ahead(points: Floats, origin: Floats, direction: Floats, tolerance: float) -> bool:
+    """Whether points of a crack lie ahead of places on its front, by the directions there."""
+    height = np.einsum("ij,ij->i", origin, direction) + tolerance
+    return any(bool((points @ d > h).any()) for d, h in zip(direction, height, strict=True))
+
+
+def _is_beyond(tree: TriangleTree, x: Floats, place: Floats) -> Bools:
+    """Which points of a strip are nearer to the crack elsewhere than where the strip comes from.
+
+    Of other fronts only those count whose own strip would lie elsewhere: in one plane strips may
+    lie over each other.
+    """
+    way = np.linalg.norm(x - place, axis=1)
+    nearest_point = closest_in(tree, x, float(way.max(initial=0.0)))
+    rows = np.nonzero((nearest_point.triangle >= 0) & (nearest_point.distance < _NEARER * way))[0]
+    distance, triangle = nearest_point.distance[rows], nearest_point.triangle[rows]
+    part = nearest_point.part[rows] - 1
+    normal = unit(tree.feature_normals[triangle, part])
+    height = np.abs(np.einsum("ij,ij->i", x[rows] - nearest_point.foot[rows], normal))
+    is_inside = (part < 0) | ~tree.rim[triangle, part]
+    result = np.zeros(len(x), dtype=bool)
+    result[rows] = is_inside | (height > _BESIDE * distance)
+    return result
 
 
 def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Ints, Floats, Floats]:
@@ -346,7 +394,11 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     band = reach + 2 * size
     surface = extended_surface(crack, mesh, band + size)
     tree = triangle_tree(surface.points, surface.triangles)
-    phi, triangle, at_end = signed_in(tree, mesh.points, band)
+
+    def distance_to(x: Floats, reach: float) -> tuple[Floats, Ints, Bools]:
+        return _distance_to_faces_first(surface, tree, x, reach, size)
+
+    phi, triangle, at_end = distance_to(mesh.points, band)
     label = np.where(triangle >= 0, surface.label[triangle], 0)
     fronts = front_frames(crack)
     far_distance = 10 * mesh.extent
@@ -354,7 +406,7 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     for k, front in enumerate(fronts):
         psi[k] = _front_distance(mesh.points, phi, label == k + 1, front, band, far_distance)
     mouth = np.where(at_end & (label == 0), np.abs(phi), -far_distance)
-    shift = _surface_shift(mesh, phi, at_end, tree)
+    shift = _surface_shift(mesh, phi, at_end, tree, distance_to)
     phi = snap_to_vertices(mesh, phi + shift)
     near_edge = near_edges(mesh, phi, shift)
     for k, front in enumerate(fronts):
@@ -444,7 +496,33 @@ def _shifted_psi(
     return shifted
 
 
-def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -> Floats:
+def _distance_to_faces_first(
+    surface: ExtendedSurface, tree: TriangleTree, x: Floats, band: float, size: float
+) -> tuple[Floats, Ints, Bools]:
+    """Distances as of `signed_in`, where faces of the crack come before its prolongations.
+
+    A prolongation that runs along, behind or through other faces of the same crack is none there:
+    what is within a cell of these is theirs.
+    """
+    phi, triangle, at_end = signed_in(tree, x, band)
+    if surface.faces is None:
+        return phi, triangle, at_end
+    rows = np.nonzero(triangle >= len(surface.faces.corners))[0]
+    distance, face, at_rim = signed_in(surface.faces, x[rows], size)
+    way = np.linalg.norm(x[rows] - surface.base[triangle[rows]], axis=1)
+    is_first = (face >= 0) & ~at_rim & (np.abs(distance) < _NEARER * way)
+    rows = rows[is_first]
+    phi[rows], triangle[rows], at_end[rows] = distance[is_first], face[is_first], False
+    return phi, triangle, at_end
+
+
+def _surface_shift(
+    mesh: Mesh,
+    phi: Floats,
+    at_end: Bools,
+    tree: TriangleTree,
+    distance_to: Callable[[Floats, float], tuple[Floats, Ints, Bools]],
+) -> Floats:
     """What to add to phi so that it is the distance in the mean square over the cut cells `(n,)`.
 
     In a cell the surface is flat: interpolated, all pieces of a curved one lie on its hollow side,
@@ -461,6 +539,8 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
         Points beyond its ends, where no cell is cut.
     tree : TriangleTree
         The surface and its prolongation.
+    distance_to : callable
+        Distances of points to it, up to a reach.
     """
     shift = np.zeros(mesh.n_points)
     low, high = _bounds(mesh, phi)
@@ -470,7 +550,7 @@ def _surface_shift(mesh: Mesh, phi: Floats, at_end: Bools, tree: TriangleTree) -
         return shift  # a plane: phi is linear
     bary, weight = simplex_rule(3, 2)
     x = np.einsum("pv,cvd->cpd", bary, mesh.points[mesh.cells[cells]]).reshape(-1, 3)
-    distances = signed_in(tree, x)
+    distances = distance_to(x, np.inf)
     distance, _, is_beyond = (a.reshape(len(cells), len(weight)) for a in distances)
     error = distance - phi[mesh.cells[cells]] @ bary.T
     size = mesh.cell_size[cells]
