@@ -95,14 +95,20 @@ def forecast_of(problem: Problem, n_states: int = 1) -> Forecast:
     standard, enriched_unknowns = dim * nodes, round(dim * functions)
     n = standard + enriched_unknowns
     by_iteration = takes_iterations(problem, n)
-    if by_iteration:
-        memory = float(np.dot(_OF_ROWS[order], (standard, enriched_unknowns)))
-        memory += _OF_STATE * (n_states - 1) * n
-        memory *= _RUBBING if problem.contact != "off" and any(problem.frictions) else 1.0
-    else:
-        each, power = _OF_FACTOR[dim]
-        memory = each * float(n) ** power
+    memory = _memory(problem, standard, enriched_unknowns, by_iteration, n_states)
     return Forecast(standard, enriched_unknowns, order, by_iteration, memory, free_memory())
+
+
+def _memory(
+    problem: Problem, standard: int, enriched: int, by_iteration: bool, n_states: int
+) -> float:
+    """Bytes that a solution of so many unknowns takes."""
+    if not by_iteration:
+        each, power = _OF_FACTOR[problem.mesh.dim]
+        return each * float(standard + enriched) ** power
+    memory = float(np.dot(_OF_ROWS[problem.order or 1], (standard, enriched)))
+    memory += _OF_STATE * (n_states - 1) * (standard + enriched)
+    return memory * (_RUBBING if problem.contact != "off" and any(problem.frictions) else 1.0)
 
 
 def check_memory(problem: Problem, n_states: int = 1) -> None:
@@ -112,7 +118,7 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
     ------
     SizeError
     """
-    if _fits_surely(problem):
+    if _fits_surely(problem, n_states):
         return
     forecast = forecast_of(problem, n_states)
     if forecast.fits:
@@ -129,15 +135,16 @@ def check_memory(problem: Problem, n_states: int = 1) -> None:
     raise SizeError(f"solve: {forecast}. Give {', '.join(remedy_list)}.")
 
 
-def _fits_surely(problem: Problem) -> bool:
-    """Whether a factorisation in 2D fits if all nodes carry all functions: no look at cracks."""
+def _fits_surely(problem: Problem, n_states: int) -> bool:
+    """Whether a solution fits if all nodes carry all functions: no look at cracks."""
     mesh, free_bytes = problem.mesh, free_memory()
-    if free_bytes is None or mesh.dim == 3 or problem.numerics.linear == "iterative":
-        return free_bytes is None
+    if free_bytes is None:
+        return True
     functions = [1 + problem.numerics.functions * crack.n_tips for crack in problem.placed]
-    each, power = _OF_FACTOR[2]
-    n = 2 * _count_nodes(mesh, problem.order or 1) * (1 + sum(functions))
-    return bool(each * float(n) ** power <= free_bytes)
+    standard = mesh.dim * _count_nodes(mesh, problem.order or 1)
+    most = standard * sum(functions)
+    ways = {takes_iterations(problem, standard), takes_iterations(problem, standard + most)}
+    return max(_memory(problem, standard, most, way, n_states) for way in ways) <= free_bytes
 
 
 def takes_iterations(problem: Problem, n: int) -> bool:
@@ -389,8 +396,8 @@ def _tips(problem: Problem, n_tips: list[int]) -> Ingredient:
         return Ingredient("tip functions", False, "no cracks")
     texts = [
         f"crack {c}: {front}"
-        for c, crack in enumerate(problem.cracks)
-        for front in GEOMETRY[problem.mesh.dim].short_fronts(crack, problem.mesh)
+        for c, (_, short_fronts) in enumerate(problem.placements)
+        for front in short_fronts
     ]
     absence = "; ".join(texts)
     if not sum(n_tips):

@@ -297,8 +297,26 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         less than half a cell inside the boundary that it comes from; it crosses itself, or comes
         back to within half a cell of itself.
     """
+    return surface_placement(crack, mesh)[0]
+
+
+def surface_placement(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
+    """A crack placed as by `place_surface`, and what its mesh is too coarse for.
+
+    Parameters
+    ----------
+    crack : Crack
+        In 3D.
+    mesh : Mesh
+
+    Returns
+    -------
+    crack : Crack
+    short_fronts : list of ShortFront
+        Pieces of the outline that are no fronts, of a crack that is placed for the first time.
+    """
     if crack.ends_on and crack.fronts is not None:
-        return crack
+        return crack, []
     body = Body.of(mesh)
     placed_crack, short_fronts = _placed_crack(crack, body)
     if crack.fronts is None:
@@ -315,7 +333,7 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
                     f"{front}: the crack cuts through there, as if it had left the body. Take at "
                     "least three cells across what is left of the body there."
                 )
-    return placed_crack
+    return placed_crack, short_fronts if crack.fronts is None else []
 
 
 def _check_apart_from_itself(crack: Crack, body: Body) -> None:
@@ -359,22 +377,6 @@ def _check_apart_from_itself(crack: Crack, body: Body) -> None:
             "refine the mesh between; or where it is folded, open it to 40 degrees or more, or "
             "leave one part out."
         )
-
-
-def short_fronts(crack: Crack, mesh: Mesh) -> list[ShortFront]:
-    """Pieces of the outline of a crack that a mesh is too coarse to take for fronts.
-
-    Parameters
-    ----------
-    crack : Crack
-        In 3D, not placed.
-    mesh : Mesh
-
-    Returns
-    -------
-    list of ShortFront
-    """
-    return _placed_crack(crack, Body.of(mesh))[1] if crack.fronts is None else []
 
 
 def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:

@@ -19,8 +19,7 @@ from xcrack.crack.placing_3d import (
     ShortFront,
     arms_placed,
     check_surfaces,
-    place_surface,
-    short_fronts,
+    surface_placement,
 )
 from xcrack.mesh.locate import contains
 from xcrack.mesh.mesh import Mesh
@@ -36,8 +35,8 @@ class Geometry:
 
     Attributes
     ----------
-    place : callable
-        As `place_crack`, which looks at the dimensions first.
+    placement : callable
+        As `placement_of`, which looks at the dimensions first.
     check : callable
         Raises where placed cracks cross or touch, or their ends are closer than a cell.
     on_others : callable (cracks as given, placed cracks, mesh)
@@ -46,8 +45,6 @@ class Geometry:
         Where placed cracks do.
     on_mesh : callable
         A placed crack as the mesh is cut by it.
-    short_fronts : callable
-        Fronts of a crack, not placed yet, that a mesh is too coarse for; none in 2D.
     end_frames : callable
         Of a placed crack: points of each tip `(2,)` or front `(m, 3)`, and frames there with rows
         (ahead, normal), in 3D (ahead, normal, along).
@@ -56,12 +53,11 @@ class Geometry:
         crack.
     """
 
-    place: Callable[[Crack, Mesh], Crack]
+    placement: Callable[[Crack, Mesh], tuple[Crack, Sequence[ShortFront]]]
     check: Callable[[tuple[Crack, ...], Mesh], None]
     on_others: Callable[..., tuple[Crack, ...]]
     junctions: Callable[..., tuple[Junction, ...]]
     on_mesh: Callable[[Crack, Mesh], Crack]
-    short_fronts: Callable[[Crack, Mesh], list[ShortFront]]
     end_frames: Callable[[Crack], CutEnds]
     end: str
     station: str
@@ -75,24 +71,22 @@ def _fronts(crack: Crack) -> CutEnds:
 
 GEOMETRY = {
     2: Geometry(
-        place_line,
+        lambda crack, mesh: (place_line(crack, mesh), ()),
         check_lines,
         junctions_2d.on_others,
         junctions_2d.junctions,
         on_mesh=vertices_on_mesh,
-        short_fronts=lambda crack, mesh: [],
         end_frames=tip_frames,
         end="tip",
         station="tip",
         size="length",
     ),
     3: Geometry(
-        place_surface,
+        surface_placement,
         check_surfaces,
         arms_placed,
         surface_junctions,
         on_mesh=lambda crack, mesh: crack,
-        short_fronts=short_fronts,
         end_frames=_fronts,
         end="front",
         station="front place",
@@ -120,9 +114,26 @@ def place_crack(crack: Crack, mesh: Mesh) -> Crack:
     GeometryError
         A crack of another dimension, outside the body, or too small for the mesh.
     """
+    return placement_of(crack, mesh)[0]
+
+
+def placement_of(crack: Crack, mesh: Mesh) -> tuple[Crack, Sequence[ShortFront]]:
+    """A crack placed as by `place_crack`, and the fronts that the mesh is too coarse for.
+
+    Parameters
+    ----------
+    crack : Crack
+    mesh : Mesh
+
+    Returns
+    -------
+    crack : Crack
+    short_fronts : sequence of ShortFront
+        None in 2D, and of a crack whose fronts are known already.
+    """
     if crack.dim != mesh.dim:
         raise GeometryError(f"a {crack.dim}D crack cannot be put into a {mesh.dim}D mesh.")
-    return GEOMETRY[mesh.dim].place(crack, mesh)
+    return GEOMETRY[mesh.dim].placement(crack, mesh)
 
 
 _ON = 1e-6  # of a side of a front, by which its end may miss the boundary
@@ -227,5 +238,6 @@ __all__ = [
     "inside_body",
     "part_inside",
     "place_crack",
+    "placement_of",
     "stations_of",
 ]

@@ -30,7 +30,8 @@ from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
 from xcrack.crack.junctions import Junction
 from xcrack.crack.measures import crack_size
-from xcrack.crack.stations import GEOMETRY, Stations, place_crack, stations_of
+from xcrack.crack.placing_3d import ShortFront
+from xcrack.crack.stations import GEOMETRY, Stations, placement_of, stations_of
 from xcrack.mesh.mesh import Mesh, warn_of_sets
 from xcrack.model.elasticity import Elasticity, elasticity
 from xcrack.model.loads import Load
@@ -279,6 +280,17 @@ class Problem(Declared):
         return elasticity(self.mesh, material)
 
     @cached_property
+    def placements(self) -> tuple[tuple[Crack, Sequence[ShortFront]], ...]:
+        """Each crack placed by itself, and the fronts that the mesh is too coarse for.
+
+        Raises
+        ------
+        CoarseMeshError
+            The mesh is too coarse for them.
+        """
+        return tuple(placement_of(crack, self.mesh) for crack in self.cracks)
+
+    @cached_property
     def placed(self) -> tuple[Crack, ...]:
         """The cracks with tips and mouths decided in this mesh.
 
@@ -287,7 +299,7 @@ class Problem(Declared):
         CoarseMeshError
             The mesh is too coarse for them.
         """
-        cracks = tuple(place_crack(crack, self.mesh) for crack in self.cracks)
+        cracks = tuple(crack for crack, _ in self.placements)
         geometry = GEOMETRY[self.mesh.dim]
         cracks = geometry.on_others(self.cracks, cracks, self.mesh)
         geometry.check(cracks, self.mesh)
