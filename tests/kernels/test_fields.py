@@ -150,7 +150,7 @@ def test_places(d):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("d", [2, 3])
 def test_tables(order, d):
-    """Standard functions and jumps written out; values alone are the same."""
+    """Standard functions and jumps written out; values alone and gradients alone are the same."""
     rng = np.random.default_rng(3107)
     n, m, nodes_n = 9, 4, n_shapes(order, d)
     bary = rng.dirichlet(np.ones(d + 1), n)
@@ -174,3 +174,7 @@ def test_tables(order, d):
     set_standard(alone, np.empty((0, 0, d)), row, bary, gradient, edges)
     set_jumps(alone, np.empty((0, 0, d)), nodes_n, row, side, nodes, node_side, number)
     assert (alone == value).all()
+    alone, no_values = np.empty_like(slope), np.empty((0, 2 * nodes_n))
+    set_standard(no_values, alone, row, bary, gradient, edges)
+    set_jumps(no_values, alone, nodes_n, row, side, nodes, node_side, number)
+    assert (alone == slope).all()

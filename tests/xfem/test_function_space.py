@@ -33,7 +33,10 @@ def test_gradients_are_those_of_the_values(number):
         nodes = space.mesh.cells[batch.cells[row]]
         phi = [np.einsum("qb,qb->q", bary, cut.level_set.phi[nodes]) for cut in space.cuts]
         side = np.where(np.stack(phi, axis=1) >= 0, 1, -1)
-        _, gradient = space.tabulate(batch, row, bary, side)
+        values, gradient = space.tabulate(batch, row, bary, side)
+        without, alone = space.tabulate(batch, row, bary, side, values=False)
+        assert without.size == 0 < values.size
+        assert (alone == gradient).all()
         size = space.mesh.cell_size[batch.cells][row]
         near = np.full(len(row), np.inf)
         x = np.einsum("qb,qbd->qd", bary, space.mesh.points[space.mesh.cells[batch.cells[row]]])

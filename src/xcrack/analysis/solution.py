@@ -362,7 +362,7 @@ def fields_at(
     coefficients = np.array(coefficients, order="C")  # kernels are compiled for read-only ones anew
     d, states = coefficients.shape[1:]
     u, gradient = np.zeros((len(cell), d, states)), np.zeros((len(cell), d, d, states))
-    for number, row, functions, N, G in _tables(space, cell, bary, side):
+    for number, row, functions, N, G in _tables(space, cell, bary, side, values=True):
         a = coefficients[functions[row]].reshape(len(row), N.shape[1], -1)
         u[number] = (N[:, None] @ a).reshape(-1, d, states)
         set_gradients(gradient, number, G, functions, row, coefficients)
@@ -383,17 +383,17 @@ def gradients_at(
     coefficients = np.array(coefficients, order="C")  # kernels are compiled for read-only ones anew
     d, states = coefficients.shape[1:]
     gradient = np.zeros((len(cell), d, d, states))
-    for number, row, functions, _, G in _tables(space, cell, bary, side):
+    for number, row, functions, _, G in _tables(space, cell, bary, side, values=False):
         set_gradients(gradient, number, G, functions, row, coefficients)
     return gradient
 
 
 def _tables(
-    space: FunctionSpace, cell: Ints, bary: Floats, side: Ints
+    space: FunctionSpace, cell: Ints, bary: Floats, side: Ints, values: bool
 ) -> Iterator[tuple[Ints, Ints, Ints, Floats, Floats]]:
     """Of each batch: numbers of its points, their rows, its functions, values and gradients."""
     for batch, number, row in space.batches_of_points(cell):
-        N, G = space.tabulate(batch, row, bary[number], side[number])
+        N, G = space.tabulate(batch, row, bary[number], side[number], values=values)
         yield number, row, batch.functions, N, G
 
 

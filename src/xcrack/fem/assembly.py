@@ -144,7 +144,8 @@ def corrected_gradients(
     Parameters
     ----------
     points : row in batch, barycentric coordinates, weights and sides of the volume points
-    values, gradients : tabulated functions at these points; gradients are changed in place
+    values, gradients : tabulated functions at these points; gradients are changed in place, and
+        values are needed where the correction is linear
     boundary : points on the boundary of all pieces
     """
     from xcrack.fem.kernels.functions import (
@@ -263,7 +264,8 @@ def tabulate_functions(space: FunctionSpace, points: Points) -> Tabulated:
     """
     batches = []
     for batch, number, row in space.batches_of_points(points.cell):
-        _, slope = space.tabulate(batch, row, points.bary[number], points.side[number])
+        where = points.bary[number], points.side[number]
+        _, slope = space.tabulate(batch, row, *where, values=False)
         batches.append((batch, number, row, slope))
     return Tabulated(points, tuple(batches))
 
@@ -430,7 +432,8 @@ def reused_cells(
     weight = elasticity.weights(points.cell, points.bary, points.weight)
     for batch, rows in space.batches(cells[new_rows]):
         number, place, first = points.of_cells(batch.cells)
-        _, G = space.tabulate(batch, place, points.bary[number], points.side[number])
+        where = points.bary[number], points.side[number]
+        _, G = space.tabulate(batch, place, *where, values=False)
         products[new_rows[rows]] = gradient_products(first, weight[number], G, n)
     return ReusedCells(cells, key, products), len(points.weight)
 
@@ -598,8 +601,10 @@ def enriched_stiffness(
         material, batch = task
         number, row, first = points.of_cells(batch.cells)
         bary, weight, side = points.bary[number], points.weight[number], points.side[number]
-        N, G = space.tabulate(batch, row, bary, side)
-        if batch.tips and boundary is not None:
+        is_corrected = bool(batch.tips) and boundary is not None
+        values = is_corrected and (d, space.order) in _LINEAR
+        N, G = space.tabulate(batch, row, bary, side, values=values)
+        if boundary is not None and is_corrected:
             G = corrected_gradients(space, batch, (row, bary, weight, side), N, G, boundary)
         return (
             material,

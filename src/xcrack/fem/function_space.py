@@ -247,9 +247,17 @@ class FunctionSpace:
         return Batch(cells, cracks, tips, functions)
 
     def tabulate(
-        self, batch: Batch, row: Ints, bary: Floats, side: Ints, slopes: bool = True
+        self,
+        batch: Batch,
+        row: Ints,
+        bary: Floats,
+        side: Ints,
+        slopes: bool = True,
+        values: bool = True,
     ) -> tuple[Floats, Floats]:
-        """Values `(q, n)` and, if wanted, gradients `(q, n, d)` of a batch's functions at points.
+        """Values `(q, n)` and gradients `(q, n, d)` of a batch's functions at points.
+
+        Of those that are not wanted `q` is 0.
 
         Parameters
         ----------
@@ -264,7 +272,7 @@ class FunctionSpace:
 
         mesh, n = self.mesh, self.cell_nodes.shape[1]
         width = batch.functions.shape[1]
-        N = np.empty((len(row), width))
+        N = np.empty((len(row) if values else 0, width))
         G = np.empty((len(row) if slopes else 0, width, self.dim))
         bary = np.ascontiguousarray(bary)
         gradient, edges = mesh.gradient[batch.cells], local_edges(self.dim)
@@ -298,7 +306,7 @@ class FunctionSpace:
         bary: Floats,
         side: Ints,
     ) -> None:
-        """Set values and, if there is room for them, gradients of the functions of tip t."""
+        """Set values and gradients of the functions of tip t, those that there is room for."""
         from xcrack.fem.kernels.functions import set_tips
 
         tip = self.tips[t]

@@ -177,11 +177,11 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
 
 
 @kernel
-def _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend):  # type: ignore[no-untyped-def]
-    """Field of Williams of one mode, and more, from the cosine and sine of half the angle.
+def _set_unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend):  # type: ignore[no-untyped-def]
+    """Set the field of Williams of one mode, and more, from the cosine and sine of half the angle.
 
-    U (t, n, b), its gradient G along t, n; d/dtheta: turned, spin; d/dx1: slope (of turned), bend.
-    Components that a mode does not have are left as they are.
+    U (t, n, b), its gradient G along t, n; d/dtheta: turned, spin; d/dx1: slope (of turned), bend,
+    where there is room for it. Components that a mode does not have are left as they are.
     """
     c, s = ch * ch - sh * sh, 2.0 * sh * ch
     c3, s3 = ch * c - sh * s, sh * c + ch * s
@@ -202,28 +202,29 @@ def _unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend
         g = scale * (a * ch + b * sh + e * c3 + d * s3)
         g1 = scale * (0.5 * (b * ch - a * sh) + 1.5 * (d * c3 - e * s3))
         g2 = -scale * (0.25 * (a * ch + b * sh) + 2.25 * (e * c3 + d * s3))
-        U[i] = root * g
-        U_turn[i] = root * g1
+        U[mode, i] = root * g
+        U_turn[mode, i] = root * g1
         p0, p1 = 0.5 * g * c - g1 * s, 0.5 * g * s + g1 * c
         d0 = -0.5 * (g1 * c + g * s) - g2 * s
         d1 = 0.5 * (g * c - g1 * s) + g2 * c
-        G[i, 0], G[i, 1] = p0 * to_slope, p1 * to_slope
-        slope[i] = (0.5 * g1 * c - g2 * s) * to_slope
-        spin[i, 0], spin[i, 1] = d0 * to_slope, d1 * to_slope
-        bend[i, 0] = (0.5 * p0 * c + d0 * s) * to_bend
-        bend[i, 1] = (0.5 * p1 * c + d1 * s) * to_bend
+        G[mode, i, 0], G[mode, i, 1] = p0 * to_slope, p1 * to_slope
+        slope[mode, i] = (0.5 * g1 * c - g2 * s) * to_slope
+        spin[mode, i, 0], spin[mode, i, 1] = d0 * to_slope, d1 * to_slope
+        if len(bend) > 0:
+            bend[mode, i, 0] = (0.5 * p0 * c + d0 * s) * to_bend
+            bend[mode, i, 1] = (0.5 * p1 * c + d1 * s) * to_bend
 
 
 @kernel
-def _unit_stress(G, lam, mu, S):  # type: ignore[no-untyped-def]
-    """Stress of a gradient that has no part along b."""
-    trace = G[0, 0] + G[1, 1]
-    S[0, 0] = lam * trace + 2 * mu * G[0, 0]
-    S[1, 1] = lam * trace + 2 * mu * G[1, 1]
-    S[2, 2] = lam * trace
-    S[0, 1] = S[1, 0] = mu * (G[0, 1] + G[1, 0])
-    S[0, 2] = S[2, 0] = mu * G[2, 0]
-    S[1, 2] = S[2, 1] = mu * G[2, 1]
+def _set_unit_stress(mode, G, lam, mu, S):  # type: ignore[no-untyped-def]
+    """Set the stress of the gradient of a mode, which has no part along b."""
+    trace = G[mode, 0, 0] + G[mode, 1, 1]
+    S[mode, 0, 0] = lam * trace + 2 * mu * G[mode, 0, 0]
+    S[mode, 1, 1] = lam * trace + 2 * mu * G[mode, 1, 1]
+    S[mode, 2, 2] = lam * trace
+    S[mode, 0, 1] = S[mode, 1, 0] = mu * (G[mode, 0, 1] + G[mode, 1, 0])
+    S[mode, 0, 2] = S[mode, 2, 0] = mu * G[mode, 2, 0]
+    S[mode, 1, 2] = S[mode, 2, 1] = mu * G[mode, 2, 1]
 
 
 @kernel
@@ -295,8 +296,9 @@ def front_terms(  # type: ignore[no-untyped-def]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
     U, U_turn, slope = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((3, 3, 2))
-    S, dS = np.empty((3, 3, 3)), np.empty((3, 3))
+    G, spin = np.zeros((3, 3, 2)), np.zeros((3, 3, 2))
+    bend = np.zeros((3 if len(initial_stress) > 0 else 0, 3, 2))
+    S, dS = np.empty((3, 3, 3)), np.empty((3, 3, 3))
     X, X1, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     g, sigma = np.empty((3, 3)), np.empty((3, 3))
     S0, S1 = np.zeros((3, 3)), np.zeros((3, 3))
@@ -325,11 +327,9 @@ def front_terms(  # type: ignore[no-untyped-def]
                 slope_r[side, k] = weight[q] * part * dQ
                 change_s[side, k] = weight[q] * rise * Q
         for m in range(3):
-            _unit_field(
-                m, r, ch, sh, kolosov, scale, U[m], U_turn[m], G[m], slope[m], spin[m], bend[m]
-            )
-            _unit_stress(G[m], lam, mu, S[m])
-            _unit_stress(spin[m], lam, mu, dS)
+            _set_unit_field(m, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend)
+            _set_unit_stress(m, G, lam, mu, S)
+            _set_unit_stress(m, spin, lam, mu, dS)
             X[m, 0] = (kt * U[m, 2] - w * (U[m, 1] + U_turn[m, 0])) * per_hs
             X[m, 1] = (kn * U[m, 2] + w * (U[m, 0] - U_turn[m, 1])) * per_hs
             X[m, 2] = -(kt * U[m, 0] + kn * U[m, 1] + w * U_turn[m, 2]) * per_hs
@@ -338,7 +338,7 @@ def front_terms(  # type: ignore[no-untyped-def]
             X1[m, 2] = -(kt * G[m, 0, 0] + kn * G[m, 1, 0] + w * slope[m, 2]) * per_hs
             for i in range(3):
                 X1[m, i] += X[m, i] * kt * per_hs
-                D[m, i] = -w * dS[i, 2] - kt * S[m, i, 0] - kn * S[m, i, 1]
+                D[m, i] = -w * dS[m, i, 2] - kt * S[m, i, 0] - kn * S[m, i, 1]
             D[m, 0] += kt * S[m, 2, 2] - w * S[m, 1, 2]
             D[m, 1] += kn * S[m, 2, 2] + w * S[m, 0, 2]
             D[m, 2] -= kt * S[m, 0, 2] + kn * S[m, 1, 2]
@@ -369,7 +369,8 @@ def front_terms(  # type: ignore[no-untyped-def]
                     p12 += sigma[i, 2] * G1 + S[m, i, 2] * g[i, 1]
                     p22 += sigma[i, 2] * X2 + S[m, i, 2] * g[i, 2]
                     volume += sigma[i, 2] * X1[m, i] + D[m, i] * g[i, 0]
-                    volume += S1[i, 0] * bend[m, i, 0] + S1[i, 1] * bend[m, i, 1]
+                    if len(bend) > 0:
+                        volume += S1[i, 0] * bend[m, i, 0] + S1[i, 1] * bend[m, i, 1]
                 p0 -= W
                 p22 -= W
                 volume += (w * p12 - kt * p22) * per_hs
@@ -418,8 +419,8 @@ def surface_terms(  # type: ignore[no-untyped-def]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
     U, U_turn, slope = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((3, 3, 2))
-    S = np.empty((3, 3))
+    G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((0, 3, 2))
+    S = np.empty((3, 3, 3))
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
     for q in range(len(weight)):
         r = polar_place[q, 0]
@@ -431,11 +432,8 @@ def surface_terms(  # type: ignore[no-untyped-def]
                 m_out[a] += frame[q, a, i] * outward_normal[q, i]
         ch, sh = math.cos(0.5 * polar_place[q, 1]), math.sin(0.5 * polar_place[q, 1])
         for mode in range(3):
-            _unit_field(
-                mode, r, ch, sh, kolosov, scale, U[mode], U_turn[mode], G[mode], slope[mode],
-                spin[mode], bend[mode],
-            )  # fmt: skip
-            _unit_stress(G[mode], lam, mu, S)
+            _set_unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend)
+            _set_unit_stress(mode, G, lam, mu, S)
             for n in range(states):
                 density = 0.0
                 for a in range(3):
@@ -455,7 +453,7 @@ def surface_terms(  # type: ignore[no-untyped-def]
                     for a in range(3):
                         for b in range(3):
                             sigma[a, b] += mu * (g[a, b] + g[b, a])
-                            density += S[a, b] * m_out[b] * g[a, 0]
+                            density += S[mode, a, b] * m_out[b] * g[a, 0]
                         sigma[a, a] += trace
                         W += sigma[a, 0] * G[mode, a, 0] + sigma[a, 1] * G[mode, a, 1]
                     density -= W * m_out[0]

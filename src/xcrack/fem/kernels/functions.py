@@ -9,14 +9,12 @@ from xcrack.base.kernels.jit import kernel
 
 @kernel
 def set_standard(value, slope, row, bary, gradient, edges):  # type: ignore[no-untyped-def]
-    """Set the shape functions of the first columns, and their gradients where these are wanted.
+    """Set the shape functions of the first columns and their gradients, where these are wanted.
 
     Parameters
     ----------
-    value : (q, k) array
-        Changed in place.
-    slope : (q or 0, k, d) array
-        Changed in place; of length 0 where it is not wanted.
+    value, slope : (q or 0, k) and (q or 0, k, d) arrays
+        Changed in place; of length 0 where they are not wanted.
     row : (q,) array of int
         Cell of each point.
     bary : (q, d + 1) array
@@ -32,18 +30,22 @@ def set_standard(value, slope, row, bary, gradient, edges):  # type: ignore[no-u
         G = gradient[row[q]]
         for b in range(corners):
             x = bary[q, b]
-            value[q, b] = x * (2.0 * x - 1.0) if is_quadratic else x
+            if len(value):
+                value[q, b] = x * (2.0 * x - 1.0) if is_quadratic else x
             if len(slope):
                 rise = 4.0 * x - 1.0 if is_quadratic else 1.0
-                for j in range(d):
-                    slope[q, b, j] = rise * G[b, j]
+                slope[q, b, 0] = rise * G[b, 0]
+                slope[q, b, 1] = rise * G[b, 1]
+                slope[q, b, d - 1] = rise * G[b, d - 1]
         for k in range(len(edges)):
             a, b = edges[k, 0], edges[k, 1]
             x, y = 4.0 * bary[q, a], 4.0 * bary[q, b]
-            value[q, corners + k] = x * bary[q, b]
+            if len(value):
+                value[q, corners + k] = x * bary[q, b]
             if len(slope):
-                for j in range(d):
-                    slope[q, corners + k, j] = y * G[a, j] + x * G[b, j]
+                slope[q, corners + k, 0] = y * G[a, 0] + x * G[b, 0]
+                slope[q, corners + k, 1] = y * G[a, 1] + x * G[b, 1]
+                slope[q, corners + k, d - 1] = y * G[a, d - 1] + x * G[b, d - 1]
 
 
 @kernel
@@ -52,10 +54,8 @@ def set_jumps(value, slope, first, row, side, nodes, node_side, number):  # type
 
     Parameters
     ----------
-    value : (q, k) array
-        Changed in place; the standard functions are in its first columns.
-    slope : (q or 0, k, d) array
-        Changed in place.
+    value, slope : (q or 0, k) and (q or 0, k, d) arrays
+        Changed in place; the standard functions are in the first columns.
     first : int
     row : (q,) array of int
     side : (q,) array of int
@@ -70,7 +70,8 @@ def set_jumps(value, slope, first, row, side, nodes, node_side, number):  # type
         for a in range(n):
             node = nodes[row[q], a]
             jump = float(side[q] - node_side[node]) if number[node] >= 0 else 0.0
-            value[q, first + a] = value[q, a] * jump
+            if len(value):
+                value[q, first + a] = value[q, a] * jump
             if len(slope):
                 for j in range(slope.shape[2]):
                     slope[q, first + a, j] = slope[q, a, j] * jump
@@ -84,10 +85,8 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, is
 
     Parameters
     ----------
-    value : (q, n) array
-        Changed in place.
-    slope : (q or 0, n, d) array
-        Changed in place; of length 0 where it is not wanted.
+    value, slope : (q or 0, n) and (q or 0, n, d) arrays
+        Changed in place; of length 0 where they are not wanted.
     first : int
     row : (q,) array of int
         Cell of each point.
@@ -106,9 +105,9 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, is
     q, corners = bary.shape
     d = corners - 1
     k = shift.shape[1]
-    slopes = len(slope) > 0
+    values, slopes = len(value) > 0, len(slope) > 0
     F, slope_ahead, normal = np.empty(4), np.empty(4), np.empty(4)
-    to_psi, to_phi, frame_slope = np.empty(d), np.empty(d), np.empty((k, d))
+    frame_slope = np.empty((4, 3))  # in 2D the last two of three components are the same
     for p in range(q):
         e = row[p]
         x = 0.0
@@ -136,32 +135,40 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, is
         if slopes:
             slope_ahead[0], slope_ahead[1] = -s / 2, c / 2
             slope_ahead[2], slope_ahead[3] = c * S / 2 + s * C, -s * S / 2 + c * C
-            for j in range(d):
-                to_psi[j] = 0.0
-                to_phi[j] = 0.0
-                for b in range(corners):
-                    to_psi[j] += psi[nodes[e, b]] * gradient[e, b, j]
-                    to_phi[j] += phi[nodes[e, b]] * gradient[e, b, j]
+            psi_x, psi_y, psi_z, phi_x, phi_y, phi_z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            for b in range(corners):
+                at_psi, at_phi = psi[nodes[e, b]], phi[nodes[e, b]]
+                psi_x += at_psi * gradient[e, b, 0]
+                psi_y += at_psi * gradient[e, b, 1]
+                psi_z += at_psi * gradient[e, b, d - 1]
+                phi_x += at_phi * gradient[e, b, 0]
+                phi_y += at_phi * gradient[e, b, 1]
+                phi_z += at_phi * gradient[e, b, d - 1]
             for f in range(4):
                 turn = slope_ahead[f]
                 slope_ahead[f] = (0.5 * F[f] * C - turn * S) / root
                 normal[f] = (0.5 * F[f] * S + turn * C) / root
-        for f in range(k):
-            for j in range(d if slopes else 0):
-                frame_slope[f, j] = slope_ahead[f] * to_psi[j] + normal[f] * to_phi[j]
+                frame_slope[f, 0] = slope_ahead[f] * psi_x + normal[f] * phi_x
+                frame_slope[f, 1] = slope_ahead[f] * psi_y + normal[f] * phi_y
+                frame_slope[f, 2] = slope_ahead[f] * psi_z + normal[f] * phi_z
         for b in range(corners):
             node, to, share = nodes[e, b], first + b * k, bary[p, b]
             if not is_active[node]:
                 for f in range(k):
-                    value[p, to + f] = 0.0
+                    if values:
+                        value[p, to + f] = 0.0
                     for j in range(d if slopes else 0):
                         slope[p, to + f, j] = 0.0
                 continue
+            x, y, z = gradient[e, b, 0], gradient[e, b, 1], gradient[e, b, d - 1]
             for f in range(k):
                 increment = root * F[f] - shift[node, f]
-                value[p, to + f] = share * increment
-                for j in range(d if slopes else 0):
-                    slope[p, to + f, j] = increment * gradient[e, b, j] + share * frame_slope[f, j]
+                if values:
+                    value[p, to + f] = share * increment
+                if slopes:
+                    slope[p, to + f, 0] = increment * x + share * frame_slope[f, 0]
+                    slope[p, to + f, 1] = increment * y + share * frame_slope[f, 1]
+                    slope[p, to + f, d - 1] = increment * z + share * frame_slope[f, 2]
 
 
 @kernel
@@ -228,7 +235,8 @@ def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # ty
         Changed in place.
     piece : (q,) array of int
     weight : (q,) array
-    value : (q, f) array
+    value : (q or 0, f) array
+        Of length 0 if a = 1.
     slope : (q, f, d) array
     moment : (q, a) array
         1 and, if a > 1, the coordinates in units of the size of the cell.
