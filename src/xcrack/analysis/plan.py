@@ -142,9 +142,10 @@ def _fits_surely(problem: Problem, n_states: int) -> bool:
         return True
     functions = [1 + problem.numerics.functions * crack.n_tips for crack in problem.placed]
     standard = mesh.dim * _count_nodes(mesh, problem.order or 1)
-    most = standard * sum(functions)
-    ways = {takes_iterations(problem, standard), takes_iterations(problem, standard + most)}
-    return max(_memory(problem, standard, most, way, n_states) for way in ways) <= free_bytes
+    n_enriched = standard * sum(functions)
+    ways = {takes_iterations(problem, standard), takes_iterations(problem, standard + n_enriched)}
+    memory = [_memory(problem, standard, n_enriched, way, n_states) for way in ways]
+    return max(memory) <= free_bytes
 
 
 def takes_iterations(problem: Problem, n: int) -> bool:
