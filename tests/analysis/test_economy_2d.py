@@ -1,5 +1,6 @@
 """Scene economy: no scene costs more than it needs, and the report says what it cost."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -41,6 +42,18 @@ def test_choices_for_cracks_change_no_bit_without_cracks(order):
     assert report.operations["multipliers"] == 0
     assert report.operations["assembled_cells"] == 0
     assert report.operations["integration_points"] == 0
+
+
+def test_a_report_is_written_when_it_is_asked_for():
+    """A solve keeps what it needs for that, of its own operations, also where it is pickled."""
+    first = xc.respond(problem(EDGE), [1.0, -0.5])
+    solution = first.solutions[1]
+    xc.respond(problem([*EDGE, (0.11, 0.02)]), [1.0], reuse=first.reuse)
+    again = pickle.loads(pickle.dumps(solution))
+    assert "summary" not in vars(solution)
+    assert str(again.report) == str(solution.report)
+    assert solution.report["load states"].reason.startswith("2, share one ")
+    assert solution.report.operations["factorisations"] == 1
 
 
 def test_the_uncracked_stiffness_is_made_once_a_mesh():

@@ -6,75 +6,119 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from xcrack.analysis.contact import ContactSolution
-from xcrack.analysis.multipliers import Multipliers
 from xcrack.analysis.plan import Ingredient, Report, Resultant, ingredients_of
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints, at, coordinates
 from xcrack.crack.crack import Crack
+from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.system import System
 from xcrack.linalg.engine import Engine
-from xcrack.linalg.rigid_motion import Motion
 from xcrack.model.loads import Load
 from xcrack.model.material import von_mises
 from xcrack.model.problem import Problem
 
 
-def report(
+@dataclass(frozen=True)
+class SolveOutcome:
+    """What a report says of a solve that its solutions do not keep.
+
+    Attributes
+    ----------
+    n_states : int
+    shared_part, solver_reason : str
+        What the load states share, and why the solver was taken; empty for the usual one.
+    operations : dict
+        As in `Report`.
+    multipliers : sequence of int or None
+        Unknowns on the faces of each crack; None without.
+    shear : sequence of int
+        Tangential unknowns of each crack that rubs.
+    n_motions : int
+        Rigid motions that were removed.
+    imbalance : float
+        Share of the loads that was out of balance.
+    unbalanced_share : float or None
+        Share of the energy of an initial stress that relaxes without any crack.
+    """
+
+    n_states: int
+    shared_part: str
+    solver_reason: str
+    operations: dict[str, int]
+    multipliers: Sequence[int | None]
+    shear: Sequence[int]
+    n_motions: int
+    imbalance: float
+    unbalanced_share: float | None
+
+
+def outcome_of(
     problem: Problem,
     model: System,
     engine: Engine,
     contact: ContactSolution,
-    motion: Motion,
+    n_motions: int,
     imbalance: float,
     n_states: int,
     unbalanced_share: float | None,
-) -> Report:
-    """The plan of a problem, completed by what its solution took.
+) -> SolveOutcome:
+    """Numbers of a solve for its report, which is written when it is asked for."""
+    method = problem.numerics.contact_method
+    has_unknowns = method is None or method.has_unknowns
+    multipliers = [None if m is None else has_unknowns * len(m.measure) for m in contact.spaces]
+    operations = {
+        "unknowns": engine.basis.shape[1],
+        "factorisations": engine.count.factorisations,
+        "solves": engine.count.solves,
+        **({"iterations": engine.count.iterations} if engine.reason else {}),
+        "assembled_cells": len(model.space.enriched_cells),
+        "integration_points": model.n_points,
+        "multipliers": sum(n or 0 for n in multipliers),
+        "contact_iterations": contact.sets,
+    }
+    shear = [len(work.shear) for work in contact.friction_work]
+    return SolveOutcome(
+        n_states, engine.shared_part, engine.reason, operations, multipliers, shear, n_motions,
+        imbalance, unbalanced_share,
+    )  # fmt: skip
 
-    Parameters
-    ----------
-    problem : Problem
-    model : System
-    engine : Engine
-    contact : ContactSolution
-    motion : Motion
-        Rigid motions that were removed.
-    imbalance : float
-        Share of the loads that was out of balance.
-    n_states : int
-    unbalanced_share : float or None
-        Share of the energy of an initial stress that relaxes without any crack.
-    """
-    d = model.space.dim
+
+def report(
+    problem: Problem,
+    space: FunctionSpace,
+    outcome: SolveOutcome,
+    resultants_of_state: tuple[Resultant, ...],
+) -> Report:
+    """The plan of a problem, completed by what its solution took."""
+    d = space.dim
     rows = []
-    n_heaviside = sum(int((h >= 0).sum()) for h in model.space.heaviside) * d
+    n_heaviside = sum(int((h >= 0).sum()) for h in space.heaviside) * d
     basis = problem.numerics.tip_basis
-    each = [d * tip.functions if basis is None else basis.unknowns(d) for tip in model.space.tips]
-    n_points = [int((tip.point_to_function >= 0).sum()) for tip in model.space.tips]
+    each = [d * tip.functions if basis is None else basis.unknowns(d) for tip in space.tips]
+    n_points = [int((tip.point_to_function >= 0).sum()) for tip in space.tips]
     n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
     for row in ingredients_of(problem):
         if row.name == "Heaviside functions":
             row = replace(row, unknowns=n_heaviside)
         elif row.name == "tip functions" and row.used:
-            radii = ", ".join(f"{r:.4g}" for r in model.space.radius)
+            radii = ", ".join(f"{r:.4g}" for r in space.radius)
             row = replace(row, unknowns=n_tip, reason=f"{row.reason}; radius {radii}")
         elif row.name.startswith("multipliers of crack"):
-            row = _multiplier_row(problem, contact, int(row.name.split()[-1]))
+            row = _multiplier_row(problem, outcome, int(row.name.split()[-1]))
         elif row.name == "friction" and row.used:
-            row = _friction_row(row, contact)
-        elif row.name == "supports" and motion.modes.shape[1]:
+            row = _friction_row(row, outcome)
+        elif row.name == "supports" and outcome.n_motions:
             row = replace(
                 row,
-                reason=f"{motion.modes.shape[1]} rigid motion(s) free and removed; loads balance "
-                f"to {imbalance:.1e}",
+                reason=f"{outcome.n_motions} rigid motion(s) free and removed; loads balance "
+                f"to {outcome.imbalance:.1e}",
             )
         rows.append(row)
-    sharing = f"share one {engine.shared_part}" if n_states > 1 else f"one {engine.shared_part}"
-    rows.append(Ingredient("load states", True, f"{n_states}, {sharing}"))
-    standard = model.space.n_nodes * d
-    rows.append(
-        Ingredient("standard functions", True, f"order {model.space.order}", unknowns=standard)
-    )
+    sharing = "share one" if outcome.n_states > 1 else "one"
+    words = f"{outcome.n_states}, {sharing} {outcome.shared_part}"
+    rows.append(Ingredient("load states", True, words))
+    standard = space.n_nodes * d
+    rows.append(Ingredient("standard functions", True, f"order {space.order}", unknowns=standard))
     for c, (given_crack, placed_crack) in enumerate(
         zip(problem.cracks, problem.placed, strict=True)
     ):
@@ -94,23 +138,13 @@ def report(
             for junction in problem.junctions
         ]
         rows.append(Ingredient("ends on other cracks", True, ", ".join(where)))
-    if unbalanced_share is not None:
-        share = f"{unbalanced_share:.2%}"
+    if outcome.unbalanced_share is not None:
+        share = f"{outcome.unbalanced_share:.2%}"
         reason = f"{share} of its energy is out of balance: it relaxes without any crack"
         rows.append(Ingredient("initial stress", True, reason))
-    if engine.reason:
-        rows.append(Ingredient("linear solver", True, engine.reason))
-    operations = {
-        "unknowns": engine.basis.shape[1],
-        "factorisations": engine.count.factorisations,
-        "solves": engine.count.solves,
-        **({"iterations": engine.count.iterations} if engine.reason else {}),
-        "assembled_cells": len(model.space.enriched_cells),
-        "integration_points": model.n_points,
-        "multipliers": _n_multipliers(problem, contact.spaces),
-        "contact_iterations": contact.sets,
-    }
-    return Report(tuple(rows), operations)
+    if outcome.solver_reason:
+        rows.append(Ingredient("linear solver", True, outcome.solver_reason))
+    return Report(tuple(rows), outcome.operations, resultants_of_state)
 
 
 def _mouths(given_crack: Crack, placed_crack: Crack, n_joints: int) -> str:
@@ -122,33 +156,24 @@ def _mouths(given_crack: Crack, placed_crack: Crack, n_joints: int) -> str:
     return f"{2 - placed_crack.n_tips - n_joints}, prolonged to one cell outside"
 
 
-def _multiplier_row(problem: Problem, contact: ContactSolution, c: int) -> Ingredient:
-    name = f"multipliers of crack {c}"
-    m = contact.spaces[c]
-    if m is not None:
+def _multiplier_row(problem: Problem, outcome: SolveOutcome, c: int) -> Ingredient:
+    name, unknowns = f"multipliers of crack {c}", outcome.multipliers[c]
+    if unknowns is not None:
         reason = (
             "contact is switched on" if problem.contact == "on" else "the open crack faces overlap"
         )
         if problem.numerics.contact_method is not None:
             reason += f"; by {problem.numerics.contact_method.label}"
-        return Ingredient(name, True, reason, unknowns=_n_multipliers(problem, [m]))
+        return Ingredient(name, True, reason, unknowns=unknowns)
     if problem.contact == "off":
         return Ingredient(name, False, "contact is switched off: crack faces may overlap")
     return Ingredient(name, False, "the crack faces stay apart in every load state")
 
 
-def _friction_row(row: Ingredient, contact: ContactSolution) -> Ingredient:
-    if not contact.friction_work:
+def _friction_row(row: Ingredient, outcome: SolveOutcome) -> Ingredient:
+    if not outcome.shear:
         return replace(row, used=False, reason="no crack with friction has faces that press")
-    return replace(row, unknowns=sum(len(each.shear) for each in contact.friction_work))
-
-
-def _n_multipliers(problem: Problem, spaces: Sequence[Multipliers | None]) -> int:
-    """Unknowns of the crack faces: some methods have none."""
-    method = problem.numerics.contact_method
-    if method is not None and not method.has_unknowns:
-        return 0
-    return sum(len(m.measure) for m in spaces if m is not None)
+    return replace(row, unknowns=sum(outcome.shear))
 
 
 # Resultants of loads and reactions of supports.

@@ -1,6 +1,6 @@
 """What a solve returns: displacements, stresses, openings and contact, anywhere in the body."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Real
@@ -78,8 +78,8 @@ class Solution:
         One entry a crack: Contact, or None where it has no multipliers.
     energy : float
         Strain energy, u K u / 2.
-    summary : Report
-        What was modelled, what was left out, and why.
+    make_summary : callable
+        Makes `summary`, when it is asked for: steps of a run never do.
     reuse : SolverState
         What serves the next solve in the same mesh.
     number : int
@@ -98,11 +98,16 @@ class Solution:
     lips: tuple[LipPoints, ...]
     contact: tuple[Contact | None, ...]
     energy: float
-    summary: Report
+    make_summary: Callable[[], Report]
     reuse: SolverState
     number: int = 0
     factored: FactoredSolution | None = None
     dissipated: float = 0.0
+
+    @cached_property
+    def summary(self) -> Report:
+        """What was modelled, what was left out, and why."""
+        return self.make_summary()
 
     @cached_property
     def report(self) -> Report:

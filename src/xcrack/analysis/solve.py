@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from xcrack.analysis.contact import contact_of, solve_contact
 from xcrack.analysis.friction import slip_of
 from xcrack.analysis.plan import check_memory, takes_iterations
-from xcrack.analysis.report import alarms_of_solutions, report, resultants
+from xcrack.analysis.report import alarms_of_solutions, outcome_of, report, resultants
 from xcrack.analysis.solution import FactoredSolution, Solution
 from xcrack.base.arguments import Function, Items, Switch, check_arguments
 from xcrack.base.arrays import Bools, Floats, lock
@@ -226,9 +226,10 @@ def _solve_states(
     # It depends on the mesh, not on the cracks: steps of a run leave it out.
     first = cases[0].load_state.loads
     unbalanced_share = None if reuse is not None else out_of_balance(problem, model, first)
-    summary = report(
-        problem, model, engine, contact_solution, motion, imbalance, len(states), unbalanced_share
-    )
+    outcome = outcome_of(
+        problem, model, engine, contact_solution, motion.modes.shape[1], imbalance, len(states),
+        unbalanced_share,
+    )  # fmt: skip
     solutions = []
     inner = times(engine.matrix, u)
     for k, (state, case) in enumerate(zip(states, cases, strict=True)):
@@ -244,7 +245,7 @@ def _solve_states(
                 lips=model.lips,
                 contact=contact_of(model, contact_solution, u[:, k], k),
                 energy=0.5 * float(u[:, k] @ forces),
-                summary=replace(summary, resultants=rows),
+                make_summary=partial(report, problem, model.space, outcome, rows),
                 reuse=handed_on,
                 number=k,
                 factored=factored,

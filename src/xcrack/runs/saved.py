@@ -7,6 +7,7 @@ place: pictures, K and reports work; solving again asks for the script.
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -265,8 +266,9 @@ def _solutions(content: dict[str, Any]) -> list[Solution]:
                 f"the file holds {len(u)} unknowns, and its problem has {space.n_dof} in this "
                 "xcrack: read it with the version that wrote it."
             )
-        names = ("state", "acting", "contact", "energy", "summary", "dissipated")
+        names = ("state", "acting", "contact", "energy", "dissipated")
         parts = {name: state[name] for name in names}
+        parts["make_summary"] = partial(replace, state["summary"])  # a copy of it
         solutions.append(
             Solution(problem=problem, space=space, u=u, lips=lips, reuse=reuse,
                      **parts)

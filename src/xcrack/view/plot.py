@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -325,7 +326,7 @@ def _solution_to_draw(source: Solution | Problem, field: str) -> Solution:
         lips=lips,
         contact=(None,) * len(lips),
         energy=0.0,
-        summary=Report((), {}),
+        make_summary=partial(Report, (), {}),
         reuse=SolverState(),
     )
 
