@@ -3,10 +3,13 @@
 Tolerances are of discretisation unless they say otherwise. `pytest -s` prints the numbers.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import xcrack as xc
+from scripts import growth_scenes
 from support import scenes_fronts as fronts
 from xcrack import load
 
@@ -328,3 +331,58 @@ def test_growth_ends_where_the_front_leaves_the_body():
     assert "crack 0" in history.ended
     assert 2 <= len(history.steps) <= 3
     check_frozen(history.steps)
+
+
+# Fronts that end at a surface --------------------------------------------------------------------
+
+
+def growing_where_K_falls_from_the_side(shape, n, layers):
+    """K falls linearly with the depth below the side z = 0, where a front of K from a formula ends.
+
+    No vertex of the front lies there. What K the crack has at the side itself says how long all of
+    it takes: cycles are those of the fastest place.
+    """
+    mesh = xc.box((0.0, -1.0, 0.0), (1.0, 1.0, 0.6), (n, 2 * n + 1, layers))
+    line = [(-0.05, 0.013, -0.05), (0.33, 0.013, -0.05), (0.33, 0.013, 0.65), (-0.05, 0.013, 0.65)]
+    corner = xc.elliptic_crack((0.0, 0.013, 0.0), (0, 1, 0), (1, 0, 0), 0.3, 0.3, n=51)
+    crack = {"through": xc.plane_crack(line), "corner": corner}[shape]
+    problem = xc.Problem(mesh, STEEL, [crack], loads=PULL, order=1)
+
+    def response(problem, states, reuse, bars):
+        K = 2.0 - 1.5 * problem.stations.x[:, 2]
+        return xc.Response.of_K(
+            problem, states, [np.stack([f * K, 0 * K, 0 * K], axis=1) for f in states]
+        )
+
+    return list(
+        xc.grow(problem, xc.paris(1e-3, 3.0), xc.max_hoop_stress, xc.Cycle(0.0, 1.0), da=0.08,
+                max_steps=3, response=response, progress=False)
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("shape", "n", "layers"), [("through", 7, 3), ("corner", 10, 4)])
+def test_a_front_has_a_station_where_it_leaves_the_body(shape, n, layers):
+    """Life by K at the surface: by the last vertex inside it was 9 to 36 % longer (exact)."""
+    steps = growing_where_K_falls_from_the_side(shape, n, layers)
+    for step in steps:
+        x = step.sif[0][0].x
+        on_side = np.abs(x[:, 2]) < 1e-9
+        assert on_side.sum() == 1
+        assert on_side[[0, -1]].any()
+    assert steps[-1].cycles == pytest.approx(2 * 0.08 / (1e-3 * 2.0**3), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_life_of_a_corner_crack_at_a_hole_does_not_depend_on_where_its_vertices_lie():
+    """Three cells a radius; where vertices lay decided K at the surface: N was 3.6 to 6 % apart."""
+    lives = []
+    for n in (64, 70, 90, 128):
+        problem, cycle, options = growth_scenes.SCENES["corner_crack_at_hole"]()
+        crack = xc.elliptic_crack((1.0, 0.021, 0.0), (0, 1, 0), (1, 0, 0), 0.5, 0.5, n=n)
+        problem = replace(problem, cracks=(crack,))
+        steps = xc.grow(problem, growth_scenes.PARIS, xc.max_hoop_stress, cycle, progress=False,
+                        **options | {"max_steps": 4})  # fmt: skip
+        lives.append([step.cycles for step in steps][1:])
+    spread = np.ptp(lives, axis=0) / np.mean(lives, axis=0)
+    print(f"\nlives of a corner crack at a hole: {np.round(lives)}, apart {spread}")
+    assert spread[1:].max() <= 0.015

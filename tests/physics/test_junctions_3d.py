@@ -275,7 +275,8 @@ def test_K_of_crossing_pennies():
         angle = np.degrees(np.arctan2(x[:, across], x[:, first]))
         own = PchipInterpolator([float(a) for a in wanted[name]], list(wanted[name].values()))
         unit = 2 * 100.0 * np.sqrt(radius / np.pi)
-        error = sif.K[:, 0] / unit - own(angle)
+        error = (sif.K[:, 0] / unit - own(angle))[~sif.at_surface]  # the others have K of a depth
+        angle = angle[~sif.at_surface]
         largest = max(wanted[name].values())
         print(f"; {name}: {np.abs(error).max() / largest:.3f}", end="")
         if name == "large":

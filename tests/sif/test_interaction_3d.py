@@ -25,6 +25,7 @@ from xcrack.sif.interaction_3d import (
     lip_integrals,
     mean_integrals,
     reading,
+    reading_of_modes,
     solve_front,
 )
 
@@ -293,6 +294,29 @@ def test_values_along_the_front():
     at = np.linspace(0, 4, 31)
     result = reading(knots, valid, straight, at) @ (1 + 2 * knots[valid])
     np.testing.assert_allclose(result, 1 + 2 * np.clip(at, 0.25, 3.75), atol=1e-12)
+
+
+def test_values_at_a_plane_of_symmetry():
+    """K_I goes on as in a mirror: its value at the end follows from half a hat (discretisation)."""
+    straight = flat_front(
+        np.array([[0.0, 2, 0], [0, -2, 0]]), np.array([[1.0, 0, 0], [1, 0, 0]]), False
+    )
+    knots = front_nodes(straight, even(0.5))
+    hats_known, at_plane = np.ones(len(knots), dtype=bool), np.zeros(len(knots), dtype=bool)
+    at_plane[0] = True
+    s = np.linspace(0, 4, 31)
+    matrices = reading_of_modes(knots, hats_known, straight, s, at_plane)
+    np.testing.assert_allclose(matrices[0] @ np.cos(knots), np.cos(s), atol=2e-3)
+    np.testing.assert_allclose(matrices[0], matrices[1])
+    np.testing.assert_array_equal(matrices[2], reading(knots, hats_known, straight, s))
+    # Noise of one integral moves K at the end less than without the plane.
+    I = np.zeros((1, 1, 3, len(knots)))
+    I[..., 0] = 1.0
+    plain, mirrored = (
+        solve_front(I, knots, straight, STEEL, hats_known, plane)[0, 0, 0, 0]
+        for plane in (None, at_plane)
+    )
+    assert 0 < mirrored < 0.7 * plain
 
 
 def test_penny_by_the_finite_element_solution():

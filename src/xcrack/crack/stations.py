@@ -10,7 +10,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 from xcrack.crack import junctions as junctions_2d
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.front_curve import front_curve
+from xcrack.crack.front_curve import FrontCurve, front_curve
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.junctions import Junction
 from xcrack.crack.junctions_3d import is_before, surface_junctions
@@ -137,6 +137,7 @@ def placement_of(crack: Crack, mesh: Mesh) -> tuple[Crack, Sequence[ShortFront]]
 
 
 _ON = 1e-6  # of a side of a front, by which its end may miss the boundary
+_SAMPLES = 400  # points of an open front among which its way into the body is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,13 +175,96 @@ def inside_body(cracks: Sequence[Crack], c: int, mesh: Mesh, x: Floats) -> Bools
     return np.asarray(is_inside_)
 
 
-def part_inside(
+@dataclass(frozen=True, eq=False)
+class FrontInBody:
+    """A front as far as it lies in the body: its vertices there, and where it leaves.
+
+    Attributes
+    ----------
+    curve : FrontCurve
+        Through the vertices in the body and one beyond each end: from there a front is led out in a
+        direction of its own.
+    ends : (float, float) or None, length
+        Parameters at which an open front enters and leaves the body, all of a closed one; None if
+        it never does.
+    at : (f,) array, length
+        Parameters of the vertices in the body, and of the ends that are none.
+    number : (f,) array
+        Vertices as numbers within the front; a place between two of them is no whole number.
+    x : (f, 3) array, length
+    frame : (f, 3, 3) array
+        Rows (ahead, normal, along).
+    s : (f,) array, length
+        Arc length from the first vertex of the front.
+    """
+
+    curve: FrontCurve
+    ends: tuple[float, float] | None
+    at: Floats
+    number: Floats
+    x: Floats
+    frame: Floats
+    s: Floats
+
+    def with_frames(self, frame: Floats) -> Floats:
+        """Frames `(f, 3, 3)` of which those of the vertices are given ones `(m, 3, 3)`."""
+        is_vertex = self.number % 1 == 0
+        result = np.array(self.frame)
+        result[is_vertex] = frame[self.number[is_vertex].astype(np.int64)]
+        return result
+
+
+def front_in_body(
+    x: Floats, frame: Floats, is_closed: bool, is_inside: Callable[[Floats], Bools]
+) -> FrontInBody:
+    """Clip a front to the body.
+
+    Parameters
+    ----------
+    x : (m, 3) array, length
+        Vertices of the front.
+    frame : (m, 3, 3) array
+    is_closed : bool
+    is_inside : callable
+        Which points (q, 3) lie in the body, as `inside_body`.
+
+    Returns
+    -------
+    FrontInBody
+        Whose first and last place lie where the front comes through the surface: the last vertex
+        inside may be as far from there as its sides are long, and K, rate and angle differ over
+        that way.
+    """
+    rows_inside = np.nonzero(is_inside(np.array(x)))[0]
+    whole_curve = front_curve(x, frame, is_closed)
+    curve, first, last = whole_curve, 0, len(x)
+    if not is_closed:
+        first, last = _part_inside(x, rows_inside, is_inside)
+        if last - first < len(x):
+            curve = front_curve(x[first:last], frame[first:last], is_closed)
+    at = curve.breaks[rows_inside - first]
+    ends = _way_inside(curve, is_inside) if len(rows_inside) else None
+    number = rows_inside.astype(float)
+    if not is_closed and ends is not None:
+        grid = np.arange(first, last, dtype=float)
+        of_ends = np.interp(ends, curve.breaks, grid)
+        is_new = np.array([number[0] - of_ends[0], of_ends[1] - number[-1]]) > _ON
+        order = np.argsort(np.append(number, of_ends[is_new]), kind="stable")
+        number = np.append(number, of_ends[is_new])[order]
+        at = np.append(at, np.array(ends)[is_new])[order]
+    places, frames, _ = curve.at(at)
+    is_vertex = number % 1 == 0
+    places[is_vertex] = np.asarray(x)[number[is_vertex].astype(np.int64)]
+    breaks = np.interp(number, np.arange(len(whole_curve.breaks)), whole_curve.breaks)
+    return FrontInBody(curve, ends, at, number, places, frames, whole_curve.arc(breaks))
+
+
+def _part_inside(
     x: Floats, rows_inside: Ints, is_inside: Callable[[Floats], Bools]
 ) -> tuple[int, int]:
     """First vertex of an open front to count, and the one behind the last.
 
-    One beyond each end of the part in the body, where that does not end at a vertex: from there a
-    front is led out of the body in a direction of its own.
+    One beyond each end of the part in the body, where that does not end at a vertex.
     """
     if not len(rows_inside):
         return 0, len(x)
@@ -192,6 +276,30 @@ def part_inside(
         k if is_beyond else end for k, end, is_beyond in zip(next_rows, (first, last), goes_on)
     )
     return (first, last + 1) if last > first else (0, len(x))
+
+
+def _way_inside(
+    curve: FrontCurve, is_inside: Callable[[Floats], Bools]
+) -> tuple[float, float] | None:
+    """Parameters at which an open front enters and leaves the body; None if it never does."""
+    if curve.closed:
+        return 0.0, curve.length
+    s = np.linspace(0.0, curve.length, _SAMPLES + 1)
+    rows_inside = np.nonzero(is_inside(curve.at(s)[0]))[0]
+    if not len(rows_inside):
+        return None
+    ends = []
+    for last, step in ((int(rows_inside[0]), -1), (int(rows_inside[-1]), 1)):
+        s_inside = s[last]
+        s_outside = s[min(max(last + step, 0), _SAMPLES)]
+        for _ in range(30 if s_outside != s_inside else 0):
+            middle = (s_inside + s_outside) / 2
+            if is_inside(curve.at(np.array([middle]))[0])[0]:
+                s_inside = middle
+            else:
+                s_outside = middle
+        ends.append(float(s_inside))
+    return ends[0], ends[1]
 
 
 def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
@@ -212,15 +320,8 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
         else:
             for k, front in enumerate(front_frames(crack)):
                 is_inside = partial(inside_body, cracks, c, mesh)
-                rows_inside = np.nonzero(is_inside(np.array(front.x)))[0]
-                curve = front_curve(front.x, front.frame, front.closed)
-                first, last = 0, len(front.x)
-                if not front.closed:
-                    first, last = part_inside(front.x, rows_inside, is_inside)
-                part = front_curve(front.x[first:last], front.frame[first:last], front.closed)
-                frame = part.at(part.breaks[rows_inside - first])[1]
-                s = curve.arc(curve.breaks[rows_inside])
-                rows.append((c, k, s, front.x[rows_inside], frame))
+                part = front_in_body(front.x, front.frame, front.closed, is_inside)
+                rows.append((c, k, part.s, part.x, part.frame))
     count = [len(row[2]) for row in rows]
     return Stations(
         lock(np.repeat([row[0] for row in rows], count).astype(np.int64)),
@@ -233,10 +334,11 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
 
 __all__ = [
     "GEOMETRY",
+    "FrontInBody",
     "Geometry",
     "Stations",
+    "front_in_body",
     "inside_body",
-    "part_inside",
     "place_crack",
     "placement_of",
     "stations_of",

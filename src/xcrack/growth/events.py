@@ -7,6 +7,7 @@ import numpy as np
 
 from xcrack.base.arrays import Floats, at, coordinates
 from xcrack.base.errors import GeometryError
+from xcrack.crack.boundary_trace import ON
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import exit_ahead, facet_names, front_ends
@@ -320,7 +321,9 @@ def _parts(start: Floats, move: Floats, body: Body) -> Floats:
     part = np.full(len(start), np.inf)
     if not len(start):
         return part
-    rows_out = np.nonzero((body.depth(start)[0] < 0) & (body.depth(start + move)[0] >= 0))[0]
+    depth, size = body.depth(start)
+    # A front ends on the surface: what begins there runs along it, and leaves by round-off only.
+    rows_out = np.nonzero((depth < -ON * size) & (body.depth(start + move)[0] >= 0))[0]
     low, high = np.zeros(len(rows_out)), np.ones(len(rows_out))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)

@@ -6,6 +6,7 @@ the same fronts again by the rates at both ends, which are carried along the str
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 from scipy.special import exprel
@@ -17,7 +18,7 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import crack_size
 from xcrack.crack.placing_3d import place_arm, place_arms
-from xcrack.crack.stations import inside_body, place_crack
+from xcrack.crack.stations import front_in_body, inside_body, place_crack
 from xcrack.fatigue.retardation import (
     POINTS,
     BlockCycles,
@@ -190,19 +191,22 @@ def _corrected_part(
     stations_here, solves = solved_part
     crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
-    x = np.concatenate([front.x for front in fronts])
-    count = [len(front.x) for front in fronts]
-    number = np.repeat(np.arange(len(fronts)), count)
+    is_inside = partial(inside_body, cracks, c, mesh)
+    places = [front_in_body(one.x, one.frame, one.closed, is_inside) for one in fronts]
+    x = np.concatenate([each.x for each in places])
+    number = np.repeat(np.arange(len(fronts)), [len(each.x) for each in places])
     rate = _values_beside(stations_here, solves.rate[0], x, mesh)
-    has_rate = ~np.isnan(rate) & inside_body(cracks, c, mesh, x)
+    has_rate = ~np.isnan(rate)
     x, number = x[has_rate], number[has_rate]
     lengths = front_lengths(crack)
     part = GrowthStations(
         crack=np.full(len(x), c),
         front=number,
-        s=np.concatenate([front.s[: len(front.x)] for front in fronts])[has_rate],
+        s=np.concatenate(
+            [np.interp(p.number, np.arange(len(f.s)), f.s) for p, f in zip(places, fronts)]
+        )[has_rate],
         x=x,
-        frame=np.concatenate([front.frame for front in fronts])[has_rate],
+        frame=np.concatenate([p.with_frames(f.frame) for p, f in zip(places, fronts)])[has_rate],
         end=np.array(identities.ends[c], dtype=np.int64)[number],
         closed=np.array(closed_fronts(crack), dtype=bool)[number],
         length=lengths[number],

@@ -307,7 +307,7 @@ class Problem(Declared):
 
     @cached_property
     def stations(self) -> Stations:
-        """Tips, in 3D vertices of the fronts, of the placed cracks inside the body."""
+        """Tips of placed cracks in the body, in 3D vertices of fronts and where these leave it."""
         return stations_of(self.placed, self.mesh)
 
     @cached_property

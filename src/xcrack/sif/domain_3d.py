@@ -11,9 +11,9 @@ from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
 from xcrack.base.machine import stream_tasks
-from xcrack.crack.front_curve import FootPoints, FrontCurve, front_curve
+from xcrack.crack.front_curve import FootPoints, FrontCurve
 from xcrack.crack.junctions_3d import are_opposite
-from xcrack.crack.stations import inside_body, part_inside
+from xcrack.crack.stations import front_in_body, inside_body
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side, lip_side
 from xcrack.mesh.distances import closest_in, triangle_tree
@@ -34,11 +34,12 @@ from xcrack.sif.interaction_3d import (
     front_nodes,
     lip_integrals,
     mean_integrals,
-    reading,
+    reading_of_modes,
     solve_front,
     twice_as_wide,
 )
 from xcrack.sif.sides_3d import (
+    Sides,
     before_junctions,
     integrals_of_sides,
     on_smooth_planes,
@@ -60,12 +61,12 @@ _LEAST = 0.8  # legs; the radius of the smallest domain
 # grows by this share of the distance.
 _SPACING, _CLOSEST, _FIRST, _GROWTH = 2.0, 0.7, 1.0, 0.3
 _POINTS, _DEGREE = 5, 5  # of the rules around the front and away from it
+_AT_PLANE = 0.5  # legs along a front, within which its end lies at a plane of symmetry
 _NARROW = 1.5  # legs; a domain clipped below gives a warning
 _BEND_OVER = 2.0  # legs over which a bend is averaged that gives a warning: waves are shorter
 _DIFFER = 0.05  # difference of two domains, as a share of the largest K, that gives a warning
 _DEPTH = 0.02  # of a front, where K is read that has no limit at a free surface
 _CHUNK = 1000  # cells integrated at once; bounds the memory
-_SAMPLES = 400  # points of an open front among which its way into the body is looked for
 _ON = 1e-9  # of the length of a front, by which a place at the top of a hat may miss it
 _IN_HAT = 9  # points on either side of a hat at which the room for its domain is looked at
 
@@ -123,28 +124,22 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     tip = space.tips[t]
     number = space.cracks[tip.crack].fronts or ()
     is_closed = bool(number[tip.number][0] == number[tip.number][-1])
-    whole_curve = front_curve(tip.x, tip.frame, is_closed)
-    is_inside = partial(inside_body, space.cracks, tip.crack, space.mesh)
-    rows_inside = np.nonzero(is_inside(np.array(tip.x)))[0]
-    first, last = (0, len(tip.x)) if is_closed else part_inside(tip.x, rows_inside, is_inside)
-    curve = whole_curve
-    if last - first < len(tip.x):
-        curve = front_curve(tip.x[first:last], tip.frame[first:last], is_closed)
-    curve = replace(curve, is_cut=_cut_ends(solutions[0], t, curve))
-    s = curve.breaks[rows_inside - first]
-    x, frame, _ = curve.at(s)
-    ends = way_inside(curve, is_inside)
+    part = front_in_body(
+        tip.x, tip.frame, is_closed, partial(inside_body, space.cracks, tip.crack, space.mesh)
+    )
+    curve = replace(part.curve, is_cut=_cut_ends(solutions[0], t, part.curve))
+    s, ends = part.at, part.ends
     nothing = np.zeros(len(s))
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     materials = front_materials(solutions[0], t, curve, size)
     E_prime, nu = materials.moduli(s)
     empty_sif = SIF(
-        x=np.array(tip.x)[rows_inside],
-        frame=frame,
+        x=part.x,
+        frame=part.frame,
         K=np.zeros((len(s), 3)),
         T=nothing + np.nan,
         spread=np.zeros((len(s), 3)),
-        s=whole_curve.arc(whole_curve.breaks[rows_inside]),
+        s=part.s,
         front=np.zeros(len(s), dtype=np.int64),
         at_surface=np.ones(len(s), dtype=bool),
         closed=np.zeros(len(s), dtype=bool),
@@ -157,7 +152,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         return [empty_sif] * len(solutions)
     values = front_values(solutions, t, curve, ends, materials)
     if not values.is_known.any():
-        _warn_unknown(x, values)
+        _warn_unknown(part.x, values)
         return [empty_sif] * len(solutions)
     depth = _depth(solutions[0], curve, ends)
     is_free = _free_ends(curve, values)
@@ -166,9 +161,9 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     )
     read, passes = materials.beside_changes(read, values.domain.size)
     all_places = np.append(read, (ends[0] + depth, ends[1] - depth))
-    matrix = reading(values.knots, values.is_known, curve, all_places)
-    K = np.einsum("sv,nkvm->nksm", matrix, values.K[:, :, values.is_known])
-    K_of_wide = np.einsum("sv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
+    matrix = reading_of_modes(values.knots, values.is_known, curve, all_places, values.is_smooth)
+    K = np.einsum("msv,nkvm->nksm", matrix, values.K[:, :, values.is_known])
+    K_of_wide = np.einsum("msv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
     if not materials.is_one:
         of_material = materials.factors(all_places)
         K, K_of_wide = K * of_material, K_of_wide * of_material
@@ -262,30 +257,6 @@ def _free_ends(curve: FrontCurve, values: FrontValues) -> tuple[bool, bool]:
     return bool(is_known[0]), bool(is_known[-1])
 
 
-def way_inside(
-    curve: FrontCurve, is_inside: Callable[[Floats], Bools]
-) -> tuple[float, float] | None:
-    """Parameters at which an open front enters and leaves the body; None if it never does."""
-    if curve.closed:
-        return 0.0, curve.length
-    s = np.linspace(0.0, curve.length, _SAMPLES + 1)
-    rows_inside = np.nonzero(is_inside(curve.at(s)[0]))[0]
-    if not len(rows_inside):
-        return None
-    ends = []
-    for last, step in ((int(rows_inside[0]), -1), (int(rows_inside[-1]), 1)):
-        s_inside = s[last]
-        s_outside = s[min(max(last + step, 0), _SAMPLES)]
-        for _ in range(30 if s_outside != s_inside else 0):
-            middle = (s_inside + s_outside) / 2
-            if is_inside(curve.at(np.array([middle]))[0])[0]:
-                s_inside = middle
-            else:
-                s_outside = middle
-        ends.append(float(s_inside))
-    return ends[0], ends[1]
-
-
 def _warn_unknown(x: Floats, values: FrontValues) -> None:
     warn(
         f"the front from {at(x[0])} to {at(x[-1])} has no K: everywhere along it a side that is "
@@ -327,8 +298,9 @@ def front_values(
     tip = space.tips[t]
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     target_radius = _wanted_radius(solutions[0], t)
-    knots = front_nodes(curve, _spacing(curve, ends, size), ends)
     sides = sides_around(solutions, tip.crack, curve, target_radius)
+    at_planes = (False, False) if curve.closed else _ends_at_planes(ends, sides, size)
+    knots = front_nodes(curve, _spacing(curve, ends, size, at_planes), ends, sum(at_planes))
     room = _room(solutions[0], t, curve, knots, size)
     room_at_sides = (
         np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
@@ -348,9 +320,10 @@ def front_values(
         total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn, materials)
     for part in _domain_parts(solutions, t, curve, knots, radii, turn, materials):
         total += part
-    K = solve_front(total, knots, curve, tip_material, is_valid, is_smooth)
-    wide_K = twice_as_wide(total, knots, curve, tip_material, is_valid, is_smooth)
-    mean = mean_integrals(total[:, 0], knots, curve, tip_material)
+    scene = knots, curve, tip_material
+    K = solve_front(total, *scene, is_valid, is_smooth, materials.modulus_ratio)
+    wide_K = twice_as_wide(total, *scene, is_valid, is_smooth, materials.modulus_ratio)
+    mean = mean_integrals(total[:, 0], *scene, materials.modulus_ratio)
     least_row = int(np.argmin(room))
     bend = curve.bend(knots, _BEND_OVER * size)
     bend_at = int(np.argmin(bend))
@@ -382,17 +355,30 @@ def _distance_to_interface(solution: Solution, x: Floats) -> float:
     return float(np.abs(closest_in(tree, x).distance).min())
 
 
+def _ends_at_planes(
+    ends: tuple[float, float], sides: Sides | None, size: float
+) -> tuple[bool, bool]:
+    """Ends of a front at planes of symmetry: it does not end there, it goes on as in a mirror."""
+    if sides is None:
+        return False, False
+    s = sides.feet.s[sides.is_smooth]
+    first, last = (bool((np.abs(s - end) < _AT_PLANE * size).any()) for end in ends)
+    return first, last
+
+
 def _spacing(
-    curve: FrontCurve, ends: tuple[float, float], size: float
+    curve: FrontCurve, ends: tuple[float, float], size: float, at_planes: tuple[bool, bool]
 ) -> Callable[[Floats], Floats]:
-    """Distance between the tops of hats along a front, length."""
+    """Distance between the tops of hats along a front, length: shorter at ends, where K falls."""
 
     def spacing(s: Floats) -> Floats:
         width = np.clip(curve.bend(s, size), _CLOSEST * size, _SPACING * size)
         if curve.closed:
             return width
-        from_end = np.minimum(s - ends[0], ends[1] - s)
-        return np.minimum(width, _FIRST * size + _GROWTH * from_end)
+        for at_plane, from_end in zip(at_planes, (s - ends[0], ends[1] - s)):
+            if not at_plane:
+                width = np.minimum(width, _FIRST * size + _GROWTH * from_end)
+        return width
 
     return spacing
 

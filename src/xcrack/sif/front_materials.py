@@ -89,13 +89,21 @@ class FrontMaterials:
             nu[rows] = reference.nu
         return E_prime, nu
 
+    def modulus_ratio(self, s: Floats) -> Floats:
+        """E over that of the reference of each piece at parameters `(q,)`."""
+        result = np.ones(len(s))
+        for _, rows, ratio in self.parts(s):
+            if ratio is not None:
+                result[rows] = ratio[0]
+        return result
+
     def factors(self, s: Floats) -> Floats:
         """K over that of the first reference for the same displacements `(q, 3)`."""
         first, result = self.references[0], np.ones((len(s), 3))
         for reference, rows, _ in self.parts(s):
             result[rows, :2] = reference.E_prime / first.E_prime
             result[rows, 2] = reference.mu / first.mu
-        return result
+        return result * self.modulus_ratio(s)[:, None]
 
     def beside_changes(self, s: Floats, size: float) -> tuple[Floats, Bools]:
         """Parameters moved to a cell from where the material changes, and which have been."""

@@ -31,10 +31,15 @@ _GAUSS = np.polynomial.legendre.leggauss(6)
 _FLAT = 1e-9  # height of a lip point, as a share of the radius, that is round-off
 
 
+def _one(s: Floats) -> Floats:
+    return np.ones(len(s))
+
+
 def front_nodes(
     curve: FrontCurve,
     spacing: Callable[[Floats], Floats],
     ends: tuple[float, float] | None = None,
+    n_planes: int = 0,
 ) -> Floats:
     """Parameters s_j of the tops of the hats.
 
@@ -46,6 +51,8 @@ def front_nodes(
         front and four on an open one.
     ends : tuple of float, length, optional
         Of an open front: where it enters and where it leaves the body; None: its ends.
+    n_planes : int
+        How many of its ends are at planes of symmetry: each spares a hat.
 
     Returns
     -------
@@ -59,7 +66,7 @@ def front_nodes(
     s = np.linspace(first, last, count + 1)
     density = 1 / spacing((s[1:] + s[:-1]) / 2)
     knot_count = np.concatenate([[0.0], np.cumsum(density * np.diff(s))])
-    steps = max(_FEWEST[curve.closed], round(knot_count[-1]))
+    steps = max(_FEWEST[curve.closed] - n_planes, round(knot_count[-1]))
     knots = np.interp(np.arange(steps + 1) / steps * knot_count[-1], knot_count, s)
     return np.asarray(knots[:-1] if curve.closed else knots)
 
@@ -96,7 +103,13 @@ def hats(curve: FrontCurve, knots: Floats, s: Floats) -> tuple[Ints, Floats, Flo
     return np.ascontiguousarray(hat), t * t * (3 - 2 * t), 6 * t * (1 - t) / width[left_knot]
 
 
-def reading(knots: Floats, is_valid: Bools, curve: FrontCurve, s: Floats) -> Floats:
+def reading(
+    knots: Floats,
+    is_valid: Bools,
+    curve: FrontCurve,
+    s: Floats,
+    is_mirrored: tuple[bool, bool] = (False, False),
+) -> Floats:
     """Matrix that makes values at parameters of those at valid tops of hats: cubic splines.
 
     Parameters
@@ -106,6 +119,9 @@ def reading(knots: Floats, is_valid: Bools, curve: FrontCurve, s: Floats) -> Flo
         v of them.
     curve : FrontCurve
     s : (m,) array, length
+    is_mirrored : (bool, bool)
+        Whether the values go on beyond the first and the last top as in a mirror: their slope there
+        is zero.
 
     Returns
     -------
@@ -132,8 +148,27 @@ def reading(knots: Floats, is_valid: Bools, curve: FrontCurve, s: Floats) -> Flo
         values = np.roll(values, -turn, axis=0)
         at = np.mod(at - start, curve.length)
         at = np.where(at > (grid[-1] + curve.length) / 2, at - curve.length, at)
-    spline = CubicSpline(grid, values, bc_type="not-a-knot")
+    ends = tuple((1, np.zeros(len(grid))) if at_end else "not-a-knot" for at_end in is_mirrored)
+    spline = CubicSpline(grid, values, bc_type=ends)
     return np.asarray(spline(np.clip(at, grid[0], grid[-1])))
+
+
+def reading_of_modes(
+    knots: Floats, is_valid: Bools, curve: FrontCurve, s: Floats, is_smooth: Bools | None = None
+) -> Floats:
+    """Matrices of `reading` for K of the three modes `(3, m, v)`.
+
+    Where a front comes to a plane of symmetry (`is_smooth`, of the hats) K_I and K_II go on as in a
+    mirror, and K_III changes its sign: without that the value at the end is extrapolated from half
+    a hat.
+    """
+    odd_matrix = reading(knots, is_valid, curve, s)
+    is_at_plane = np.zeros(len(knots), dtype=bool) if is_smooth is None else is_smooth & is_valid
+    if curve.closed or not is_at_plane[[0, -1]].any():
+        return np.stack([odd_matrix] * 3)
+    is_mirrored = bool(is_at_plane[0]), bool(is_at_plane[-1])
+    even_matrix = reading(knots, is_valid, curve, s, is_mirrored)
+    return np.stack([even_matrix, even_matrix, odd_matrix])
 
 
 def domain_integrals(
@@ -352,7 +387,13 @@ def side_integrals(
     return total
 
 
-def mean_integrals(I: Floats, knots: Floats, curve: FrontCurve, tip_material: Isotropic) -> Floats:  # noqa: E741
+def mean_integrals(
+    I: Floats,  # noqa: E741
+    knots: Floats,
+    curve: FrontCurve,
+    tip_material: Isotropic,
+    modulus: Callable[[Floats], Floats] = _one,
+) -> Floats:
     """Means of K over the hats `(n, p, 3)`, stress · √length.
 
     Parameters
@@ -362,8 +403,10 @@ def mean_integrals(I: Floats, knots: Floats, curve: FrontCurve, tip_material: Is
     knots : (p,) array, length
     curve : FrontCurve
     tip_material : Isotropic
+    modulus : callable
+        As of `solve_front`.
     """
-    size = _moments(curve, knots, lambda s: np.ones((len(s), 1)))[:, 0]
+    size = _moments(curve, knots, lambda s: modulus(s)[None, :, None])[0, :, 0]
     return np.asarray(np.moveaxis(I / size, 1, 2) * _factors(tip_material))
 
 
@@ -374,6 +417,7 @@ def solve_front(
     tip_material: Isotropic,
     is_valid: Bools,
     zero: Bools | None = None,
+    modulus: Callable[[Floats], Floats] = _one,
 ) -> Floats:
     """K at the tops of the hats: a cubic spline along the front that has the integrals found.
 
@@ -387,7 +431,10 @@ def solve_front(
     is_valid : (p,) array of bool
         Hats that have an integral.
     zero : (p,) array of bool, optional
-        Hats at planes of symmetry: K_III is zero there.
+        Hats at planes of symmetry: K_III is zero there, and K_I and K_II have no slope.
+    modulus : callable
+        E over that of `tip_material` at parameters (q,); K found is that for the modulus of
+        `tip_material`, and a spline where K itself goes like the modulus.
 
     Returns
     -------
@@ -398,7 +445,11 @@ def solve_front(
     rows = np.nonzero(is_valid)[0]
     if not len(rows):
         return K
-    moments = _moments(curve, knots, lambda s: reading(knots, is_valid, curve, s))[rows]
+
+    def spline(s: Floats) -> Floats:
+        return reading_of_modes(knots, is_valid, curve, s, zero) * modulus(s)[:, None]
+
+    moments = _moments(curve, knots, spline)[:, rows]
     K[:, :, rows] = _K_of_integrals(
         moments, I[..., rows], tip_material, None if zero is None else zero[rows]
     )
@@ -412,12 +463,13 @@ def twice_as_wide(
     tip_material: Isotropic,
     is_valid: Bools,
     zero: Bools | None = None,
+    modulus: Callable[[Floats], Floats] = _one,
 ) -> Floats:
     """K at the tops of the hats from every other hat, each with the halves of those beside it.
 
     Parameters
     ----------
-    I, knots, curve, tip_material, is_valid, zero
+    I, knots, curve, tip_material, is_valid, zero, modulus
         As of `solve_front`.
 
     Returns
@@ -441,14 +493,16 @@ def twice_as_wide(
             share[wide_row, rows[row_between]] += 0.5
     tops = rows[pick]
 
+    values = None if zero is None else zero[tops]
+
     def spline(s: Floats) -> Floats:
         if is_whole:
-            return reading(knots[tops], np.ones(len(tops), dtype=bool), curve, s)
-        return reading(knots, np.isin(np.arange(len(knots)), tops), curve, s)
+            return reading_of_modes(knots[tops], np.ones(len(tops), dtype=bool), curve, s, values)
+        return reading_of_modes(knots, np.isin(np.arange(len(knots)), tops), curve, s, zero)
 
-    values = None if zero is None else zero[tops]
-    K = _K_of_integrals(share @ _moments(curve, knots, spline), I @ share.T, tip_material, values)
-    result[:, :, rows] = np.einsum("sv,nkvm->nksm", spline(knots[rows]), K)
+    moments = _moments(curve, knots, lambda s: spline(s) * modulus(s)[:, None])
+    K = _K_of_integrals(share @ moments, I @ share.T, tip_material, values)
+    result[:, :, rows] = np.einsum("msv,nkvm->nksm", spline(knots[rows]), K)
     return result
 
 
@@ -459,9 +513,9 @@ def _K_of_integrals(
     zero: Bools | None,
 ) -> Floats:
     """K `(n, k, v, 3)` of integrals `(n, k, 3, v)`; K_III is zero at some tops."""
-    K = np.empty((*I.shape[:2], len(moments), 3))
+    K = np.empty((*I.shape[:2], moments.shape[1], 3))
     for mode, factor in enumerate(_factors(tip_material)):
-        matrix, rhs = moments.copy(), I[:, :, mode]
+        matrix, rhs = moments[mode].copy(), I[:, :, mode]
         if mode == 2 and zero is not None:
             matrix[zero] = np.eye(len(matrix))[zero]
             rhs = np.where(zero, 0.0, rhs)
@@ -475,17 +529,17 @@ def _factors(tip_material: Isotropic) -> Floats:
 
 
 def _moments(curve: FrontCurve, knots: Floats, spline: Callable[[Floats], Floats]) -> Floats:
-    """Integrals of the hats over functions of the parameter, f(s) -> (q, v): `(p, v)`, length."""
+    """Integrals of the hats over functions of the parameter, f(s) -> (3, q, v): `(3, p, v)`."""
     grid = np.append(knots, knots[0] + curve.length) if curve.closed else knots
     t, weight = (_GAUSS[0] + 1) / 2, _GAUSS[1] / 2
     s = (grid[:-1, None] + np.diff(grid)[:, None] * t).ravel()
     hat, share, _ = hats(curve, knots, s)
     length = curve.at(s)[2][:, 3] * np.outer(np.diff(grid), weight).ravel()
-    values = spline(s) * length[:, None]
-    result = np.zeros((len(knots), values.shape[1]))
-    np.add.at(result, hat[:, 0], (1 - share)[:, None] * values)
-    np.add.at(result, hat[:, 1], share[:, None] * values)
-    return result
+    values = np.moveaxis(spline(s) * length[:, None], 0, 1)  # (q, 3, v)
+    result = np.zeros((len(knots), *values.shape[1:]))
+    np.add.at(result, hat[:, 0], (1 - share)[:, None, None] * values)
+    np.add.at(result, hat[:, 1], share[:, None, None] * values)
+    return np.moveaxis(result, 1, 0)
 
 
 __all__ = []

@@ -103,7 +103,8 @@ class SIF:
     ----------
     x : (f, d) array, length
         Tips in the order of the crack's points, mouths left out; in 3D vertices of the fronts
-        inside the body, in the direction of the last row of their frames.
+        inside the body, and where fronts leave it, in the direction of the last row of their
+        frames.
     frame : (f, d, d) array
         Rows (ahead, normal), in 3D (ahead, normal, ahead x normal).
     K : (f, 2 or 3) array, stress · √length
