@@ -107,9 +107,10 @@ def test_each_keeps_the_order_and_its_errors():
     with machine.threads(3) as count:
         assert count == machine.number_of_threads() == 3
         assert machine.map_tasks(slow, range(4)) == [0, 1, 2, 3]
-        assert machine.map_tasks(lambda _: machine.number_of_threads(), [0]) == [
-            1
-        ]  # no pool in a pool
+        counts = machine.map_tasks(lambda _: machine.number_of_threads(), range(2))
+        assert counts == [1, 1]  # no pool in a pool
+        caller = threading.get_ident()
+        assert machine.map_tasks(lambda _: threading.get_ident(), [0]) == [caller]
         with pytest.raises(ZeroDivisionError):
             machine.map_tasks(lambda k: 1 / k, [1, 0])
         with machine.threads(2):  # that of the outer block goes on

@@ -106,10 +106,10 @@ def map_tasks(function: Callable[[Task], Result], tasks: Iterable[Task]) -> list
         Spends its time where Python's lock is released.
     tasks : iterable
     """
-    pool = _pool.get()
-    if pool is None:
-        return [function(task) for task in tasks]
-    return list(pool.map(function, tasks))
+    pool, all_tasks = _pool.get(), list(tasks)
+    if pool is None or len(all_tasks) < 2:  # to hand over one alone only takes time
+        return [function(task) for task in all_tasks]
+    return list(pool.map(function, all_tasks))
 
 
 def stream_tasks(function: Callable[[Task], Result], tasks: Iterable[Task]) -> Iterator[Result]:

@@ -138,26 +138,25 @@ class RowBlocks:
             from xcrack.linalg.kernels.cycle import product as multiply
         else:
             from xcrack.linalg.kernels.cycle import product_of_four as multiply
-        number = self.dtype.type(scale)
         idle_values = None if self.idle_rows is None else y[self.idle_rows]
-
-        def rows(stretch: slice) -> None:
-            multiply(
-                self.first_row[stretch], self.start[stretch], self.offset[stretch], self.columns,
-                self.values, x, y, number, y,
-            )  # fmt: skip
-
+        blocks, factors = (self.first_row, self.start, self.offset), (self.columns, self.values, x)
+        number = self.values.dtype.type(scale)
         entries = len(self.values) * (1 if x.ndim == 1 else 2)
         count = min(number_of_threads(), entries // _LEAST)
-        map_tasks(rows, self._stretches(count))
+        if count < 2:
+            multiply(*blocks, *factors, y, number, y)
+        else:
+
+            def multiply_rows(stretch: slice) -> None:
+                multiply(*(each[stretch] for each in blocks), *factors, y, number, y)
+
+            map_tasks(multiply_rows, self._stretches(count))
         if idle_values is not None:
             y[self.idle_rows] = idle_values
         return y
 
     def _stretches(self, count: int) -> list[slice]:
         """Blocks of rows in stretches with about as many values each."""
-        if count < 2:
-            return [slice(None)]
         targets = np.arange(1, count) * (len(self.values) / count)
         ends = [0, *np.searchsorted(self.offset, targets), len(self.first_row) - 1]
         return [slice(a, b + 1) for a, b in itertools.pairwise(ends)]

@@ -438,10 +438,11 @@ def _domain_parts(
         near_points, feet = curve.points_near(x, outer)
         if not len(near_points):
             return None
-        counts = before_junctions(space, tip.crack, points.chosen(near_points))
+        points = points.chosen(near_points)
+        counts = before_junctions(space, tip.crack, points)
         if not counts.all():
             near_points, feet = near_points[counts], feet.chosen(counts)
-        points = points.chosen(near_points)
+            points = points.chosen(counts)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         is_behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
         force, side = _force(solutions, x[near_points]), points.side[:, tip.crack]
@@ -449,9 +450,9 @@ def _domain_parts(
             material, change = materials.references[0], None
             if not elasticity.is_uniform:
                 change = elasticity.stress_change(material, gradient, points.cell, points.bary)
+            gradient -= turn
             return domain_integrals(
-                curve, knots, feet, points.weight, gradient - turn, side, is_behind, material,
-                radii,
+                curve, knots, feet, points.weight, gradient, side, is_behind, material, radii,
                 force=force, initial_stress=initial_stress, stress_change=change,
             )  # fmt: skip
         total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
