@@ -208,10 +208,10 @@ def test_the_inner_front_of_an_annulus_closes():
 
 
 def test_cycles_of_a_ligament_inside_a_crack():
-    """In the step that breaks it, against steps a third as long: within 30 %, and late.
+    """In the step that breaks it, against steps a third as long: within 20 %, and late.
 
-    K of a round ligament goes with one over the root of its radius; what is left is that the
-    outer front grows meanwhile. At the rate of the beginning it would be 1 + m/2 times as long.
+    K of a round ligament goes with the radius of the outer front over the root of its own; it was
+    22 % with the first constant. At the rate of the beginning it would be 1 + m/2 times as long.
     """
     whole, part = (
         xc.collect(grow(scene_of(arc_crack(0.24, 0.72, 0.0), 20), da=da, max_steps=steps))
@@ -225,7 +225,7 @@ def test_cycles_of_a_ligament_inside_a_crack():
     )
     finer = np.interp(meeting_energy.areas(whole.steps[1]).sum(), areas, cycles)
     print(f"\n{join.N:.0f} for {finer:.0f}")
-    assert finer < join.N < 1.3 * finer
+    assert finer < join.N < 1.2 * finer
 
 
 def test_the_ends_of_an_arc_meet():

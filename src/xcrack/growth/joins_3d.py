@@ -274,7 +274,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         c, way, gap = facing_share
         cracks_apart = _cracks_after(rule, step, plan, way)
         crack = with_own_gap_closed(cracks_apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
-        x, time = gap.x, way
+        x, time, gain = gap.x, way, 1.0
     else:
         c, f, time = inner
         stations = solves_of(step)[0]
@@ -282,8 +282,13 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         arc = np.where(moves, time * plan.arc, 0.0)
         cracks_apart = _INTEGRATORS[rule.integrator].advanced_cracks(rule, step, arc)
         crack, x = without_inner_front(cracks_apart[c], f)
+        # The load on a ligament goes with the opening, that with the radius around it, so that K
+        # of the ligament grows like it: twice as fast as that of the front outside.
+        discs = [without_inner_front(step.corrected[c], f)[0], crack]
+        area, new_area = (crack_areas([disc], body.mesh)[0] for disc in discs)
+        gain = _gain_of(new_area / area, solves_of(step)[1].exponent, 1.0)
     cracks_now = [crack if k == c else other for k, other in enumerate(cracks_apart)]
-    cycles = time * plan.cycles
+    cycles = time * plan.cycles / gain
     join = Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), (c, c))
     return replace(
         plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN_OF_FRONTS * cycles,
@@ -648,10 +653,13 @@ def _gain(step: Step, cracks_now: Sequence[Crack], mesh: Mesh, exponent: float) 
     return max(_gain_of((size / old_size) ** 2, exponent) for old_size, size in sizes)
 
 
-def _gain_of(area_ratio: float, exponent: float) -> float:
-    """Mean rate while an area grows by a ratio, over that at its beginning."""
+def _gain_of(area_ratio: float, exponent: float, power: float = 0.5) -> float:
+    """Mean rate while an area grows by a ratio, over that at its beginning.
+
+    K goes with a power of its root.
+    """
     x = 0.5 * np.log(area_ratio)
-    return float(exprel(x) / exprel(x - exponent / 2 * x))
+    return float(exprel(x) / exprel(x - exponent * power * x))
 
 
 def _share(
