@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from support import exact
+from support import drawn_cracks, exact
 from support import scenes_2d as scenes
+from support.rows import mission
 from xcrack.verification import methods
 
 UNIT = xc.Isotropic(1.0, 0.3, "strain")
@@ -111,6 +112,31 @@ def test_pressure_that_changes_between_points(exponent):
     sif = with_error(problem)
     assert holds(sif, wanted)
     assert np.abs(sif.best - wanted).max() < 0.3 * np.abs(sif.K - wanted).max()
+
+
+# Little room, tips that are near, faces that overlap, tees where some or all faces press: their
+# errors were 3, 3.4, 14, 2.4 and 1.8 bars once.
+MISSED = (2725, *mission(4295, 4665, 5330, 6440))
+
+
+@pytest.mark.parametrize("seed", MISSED)
+def test_bars_of_drawn_scenes_that_missed(seed):
+    """Against two finer meshes.
+
+    With little room, too few points of the domain were the error; where faces of a crack that is
+    open overlap between pressures, no bar knew it; at tees where faces press the estimate has no
+    sign.
+    """
+    scene = drawn_cracks.plane(seed)
+    sifs = [with_error(scene.problem, c) for c in range(len(scene.problem.cracks))]
+    x, best, bar = (np.concatenate([getattr(s, n) for s in sifs]) for n in ("x", "best", "bar"))
+    wanted, doubt = drawn_cracks.truth(scene, x)
+    is_closed = np.concatenate([s.closed for s in sifs])
+    error = np.abs(best - wanted)
+    error[is_closed, 0] = 0.0
+    assert (error <= bar).all(), (error / bar).max()
+    assert bar.max() < 0.15 * np.abs(wanted).max()
+    assert (doubt <= 0.2 * bar).mean() > 0.6
 
 
 def pressed(mesh, line, stress=((-1.0, -0.5), (-0.5, -1.0))):

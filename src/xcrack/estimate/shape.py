@@ -32,9 +32,10 @@ _OPEN, _SMOOTH, _KINK, _BLUNT = 0.1, 0.2, 0.9, 0.5
 # within a reach, in cells, of them or of a junction, gaps of closed faces are theirs.
 _LOCKS, _LEG, _REACH = 0.03, 0.4, 1.5
 # Change of a functional over E / h times the product of both gaps, at turns, where its sign is
-# known; half-widths over the absolute products at turns, at junctions, and elsewhere.
+# known; half-widths over the absolute products at turns, at junctions, elsewhere, and where faces
+# that no pressure holds apart overlap.
 _AT_TURNS = -1.6
-_GAPS = (1.0, 1.9, 0.38)
+_GAPS = (1.0, 1.9, 0.38, 1.8)
 _DENSE = 24  # points of a piece of the faces, four times those of solutions
 
 
@@ -144,8 +145,9 @@ def gap_changes(
     """What finer pressures on closed faces would change.
 
     Faces that are closed in the mean of each pressure function have gaps g of either sign in
-    between. A pressure of the size E g / h, h the cell, would close them; it changes a functional
-    by its product with the gap of the dual solution, to a factor that is measured.
+    between, and those that are open in the mean may overlap. A pressure of the size E g / h, h the
+    cell, would close them; it changes a functional by its product with the gap of the dual
+    solution, to a factor that is measured.
 
     Parameters
     ----------
@@ -158,17 +160,19 @@ def gap_changes(
     """
     space, m = solutions[0].space, known_error.z.shape[2]
     places = np.array([j.x for j in solutions[0].problem.junctions]).reshape(-1, 2)
-    change, by_zone = np.zeros((len(solutions), m)), np.zeros((3, len(solutions), m))
+    change, by_zone = np.zeros((len(solutions), m)), np.zeros((len(_GAPS), len(solutions), m))
     by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
     for k, solution in enumerate(solutions):
         for other, contact in enumerate(solution.contact):
-            if contact is None or contact.shear is not None:
+            if contact is not None and contact.shear is not None:
                 continue
-            rows = np.nonzero(np.asarray(contact.closed) & (np.asarray(contact.pressure) > 0))[0]
+            lips, is_pressed = solution.lips[other], np.zeros(len(solution.lips[other]), dtype=bool)
+            if contact is not None:
+                is_pressed = np.asarray(contact.closed) & (np.asarray(contact.pressure) > 0)
+            rows = np.nonzero(is_pressed | _are_overlapping(solution, other))[0]
             if not len(rows):
                 continue
             columns = _columns([solution], known_error.z[[k]])
-            lips = solution.lips[other]
             cell, x = lips.cell[rows, 0], lips.x[rows]
             size = space.mesh.cell_size[cell]
             gap = _gaps(space, columns, other, lips, rows)
@@ -177,14 +181,24 @@ def gap_changes(
             modulus = solution.problem.elasticity.moduli_of_cells[cell]
             part = (modulus * lips.weight[rows] / size * gap[:, 0])[:, None] * gap[:, 1:]
             bends = _locking_points(space.cracks[other].points, float(size.mean()))
-            at_junction = _is_near(x, places, _REACH * size)
-            at_turn = _is_near(x, bends, _REACH * size) & ~at_junction
+            is_open = ~is_pressed[rows]
+            at_junction = _is_near(x, places, _REACH * size) & ~is_open
+            at_turn = _is_near(x, bends, _REACH * size) & ~at_junction & ~is_open
             change[k] += _AT_TURNS * part[at_turn].sum(axis=0)
-            for zone, among in enumerate((at_turn, at_junction, ~at_turn & ~at_junction)):
+            zones = at_turn, at_junction, ~at_turn & ~at_junction & ~is_open, is_open
+            for zone, among in enumerate(zones):
                 by_zone[zone, k] += np.abs(part[among]).sum(axis=0)
             np.add.at(by_cell[k].T, cell, np.abs(part))
     factor = np.array(_GAPS)[:, None, None]
     return GapChanges(change, np.sqrt(((factor * by_zone) ** 2).sum(axis=0)), by_cell)
+
+
+def _are_overlapping(solution: Solution, c: int) -> Bools:
+    """Points of crack c at which the faces lie over each other, where they may not `(q,)`."""
+    lips = solution.lips[c]
+    if solution.problem.contact == "off":
+        return np.zeros(len(lips), dtype=bool)
+    return np.asarray(np.einsum("qd,qd->q", solution.jump(c), lips.normal) < 0)
 
 
 def load_changes(

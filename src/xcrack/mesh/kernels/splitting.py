@@ -440,11 +440,11 @@ def _where_far_side_meets(circles, ax, ay, bx, by):  # type: ignore[no-untyped-d
     dx, dy = bx - ax, by - ay
     square, half = dx * dx + dy * dy, ax * dx + ay * dy
     for c in range(len(circles)):
-        below = half * half - square * (ax * ax + ay * ay - circles[c] * circles[c])
-        if circles[c] <= 0.0 or square <= 0.0 or not 0.0 < below < np.inf:
+        discriminant = half * half - square * (ax * ax + ay * ay - circles[c] * circles[c])
+        if circles[c] <= 0.0 or square <= 0.0 or not 0.0 < discriminant < np.inf:
             continue
         for sign in (-1.0, 1.0):
-            at = (-half + sign * math.sqrt(below)) / square
+            at = (-half + sign * math.sqrt(discriminant)) / square
             if _SAME < at < 1.0 - _SAME:
                 i = count
                 while at < place[i - 1]:
@@ -583,7 +583,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
     weight : (q,) array
     """
     stack, depths = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
-    everywhere = np.array([0.0, np.inf])
+    full_range = np.array([0.0, np.inf])
     part, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     vertex, one, one_corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     table, count = np.empty((len(bary) * len(plain_share), 5)), 0
@@ -592,11 +592,11 @@ def triangle_points(  # type: ignore[no-untyped-def]
             table, count = _put_rule(table, count, k, bary[k], share[k], plain_rule, plain_share)
             continue
         if fan[k]:
-            away = math.hypot(corners[k, 0, 0] - centre[0], corners[k, 0, 1] - centre[1])
-            is_at_centre = len(radii) > 0 and away <= _SAME * radii[0]
+            distance = math.hypot(corners[k, 0, 0] - centre[0], corners[k, 0, 1] - centre[1])
+            is_at_centre = len(radii) > 0 and distance <= _SAME * radii[0]
             table, count = _put_fan(
                 table, count, k, bary[k], corners[k], share[k], s, ws, t, wt,
-                radii if is_at_centre else everywhere,
+                radii if is_at_centre else full_range,
             )  # fmt: skip
             continue
         top = 1
@@ -632,7 +632,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
             if level == levels:
                 table, count = _put_fans_around(
                     table, count, k, vertex, corner, fraction,
-                    tips[tip_of_part], s, ws, t, wt, one, one_corner, everywhere,
+                    tips[tip_of_part], s, ws, t, wt, one, one_corner, full_range,
                 )  # fmt: skip
                 continue
             for i in range(3):
