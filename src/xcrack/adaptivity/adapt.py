@@ -164,7 +164,9 @@ def _adaptation_passes(
     for message in messages:
         warn(message)
     zero = "" if np.abs(measured_pass.K).max(initial=0.0) > 0 else "K is zero at every tip"
-    parts = [part for part in (reason, measured_pass.worst, *measured_pass.reasons, zero) if part]
+    parts = [
+        part for part in (reason, measured_pass.worst_place, *measured_pass.reasons, zero) if part
+    ]
     reason = "" if has_met else "; ".join(parts)
     return Adaptation(
         measured_pass.problem,

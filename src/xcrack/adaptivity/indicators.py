@@ -70,7 +70,7 @@ class Indicators:
         return max(largest, float(_FAINT * K_of_energy))
 
     @property
-    def worst(self) -> str:
+    def worst_place(self) -> str:
         """Where bars are longest, in words; empty where there is no bar."""
         for k in live_states(self):
             for c, sif in enumerate(self.sifs[k]):

@@ -41,8 +41,8 @@ def _sizes_at_lines(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
     for c, crack in enumerate(problem.cracks):
         length = length_inside(crack, mesh)
         for k, x in enumerate(every[c]):
-            others = np.concatenate([np.delete(every[c], k, 0), *every[:c], *every[c + 1 :]])
-            distance = np.linalg.norm(others - x, axis=1)
+            other_points = np.concatenate([np.delete(every[c], k, 0), *every[:c], *every[c + 1 :]])
+            distance = np.linalg.norm(other_points - x, axis=1)
             least_distance = float(distance[distance > 0].min(initial=np.inf))
             place.append(x[None])
             size.append(np.array([min(length / _CELLS, least_distance / _ROOM) / 2**trial]))

@@ -114,8 +114,8 @@ def _room_of_tip(problem: Problem, x: Floats, tips: list[Floats], other_tips: Fl
         if crack.points is not other_tips
     ]
     distance = [float(distance_to_simplices(x, wall).min()) for wall in walls]
-    others = [float(np.linalg.norm(x - tip)) for tip in tips if (tip != x).any()]
-    return min(distance + others)
+    distance_to_others = [float(np.linalg.norm(x - tip)) for tip in tips if (tip != x).any()]
+    return min(distance + distance_to_others)
 
 
 _ORDER = 2

@@ -218,7 +218,9 @@ def _solve_friction(
     """The load path of all states; substeps count where a crack has no multipliers yet."""
     is_closed_first = problem.numerics.initial_set == "closed"
     cracks_with_contact = {m.crack for m in chosen}
-    others = any(len(lips) and c not in cracks_with_contact for c, lips in enumerate(model.lips))
+    has_others = any(
+        len(lips) and c not in cracks_with_contact for c, lips in enumerate(model.lips)
+    )
     start, size = _start(chosen, reuse, 0, is_closed_first), _face_size(model, chosen)
     stiffness = problem.elasticity.largest_modulus / size
     earlier_slip = reuse.slip if is_repeated else None
@@ -235,7 +237,7 @@ def _solve_friction(
         u_imposed,
         start,
         stiffness,
-        others,
+        has_others,
         earlier_slip,
         springs,
     )

@@ -271,9 +271,9 @@ def shaken_down(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) 
 
 def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: int) -> SlipPoint:
     """The next state."""
-    longest = 1.0 if begin.at_rest else 1.0 / substeps
-    shortest_step = min(longest, _SHORTEST)
-    t, step, place = 0.0, longest, begin
+    longest_step = 1.0 if begin.at_rest else 1.0 / substeps
+    shortest_step = min(longest_step, _SHORTEST)
+    t, step, place = 0.0, longest_step, begin
     work, sets = 0.0, 0
     tractions_between: list[tuple[float, Floats]] = []
     while t < 1.0:
@@ -291,7 +291,7 @@ def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: in
         gap[rows.n :] += place.gap[rows.n :]
         place = SlipPoint(d, state.lam, gap, state.status)
         tractions_between.append((end, state.lam))
-        t, step = end, min(2 * step, longest)
+        t, step = end, min(2 * step, longest_step)
     return SlipPoint(
         place.d, place.lam, place.gap, place.status, work, sets, tuple(tractions_between)
     )

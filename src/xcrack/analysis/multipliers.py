@@ -180,7 +180,7 @@ def _sides_of_arm(space: FunctionSpace, joint: Joint, lips: LipPoints) -> tuple[
     cell, bary = lips.cell[:, k], lips.bary[:, k]
     corner = space.mesh.cells[cell]
     level = np.einsum("qb,qb->q", bary, space.cuts[joint.crack].level_set.phi[corner])
-    return np.where(level >= 0, 1, -1)[:, None], joint.both[cell]
+    return np.where(level >= 0, 1, -1)[:, None], joint.is_in_both[cell]
 
 
 def _split_groups(
@@ -569,10 +569,10 @@ def _hats(knots: Floats, s: Floats) -> sp.csr_matrix:
     """Piecewise linear hats along the crack: linear pressures are exact."""
     place = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
     t = (s - knots[place]) / (knots[place + 1] - knots[place])
-    both = np.stack([1 - t, t], axis=1).ravel()
+    hat_values = np.stack([1 - t, t], axis=1).ravel()
     columns = np.stack([place, place + 1], axis=1).ravel().astype(np.int32)
     start = np.arange(0, 2 * len(s) + 1, 2, dtype=np.int32)
-    return sp.csr_matrix((both, columns, start), shape=(len(s), len(knots)))
+    return sp.csr_matrix((hat_values, columns, start), shape=(len(s), len(knots)))
 
 
 def gap_rows(space_of: Multipliers, lips: LipPoints, jump: sp.csr_matrix) -> sp.csr_matrix:

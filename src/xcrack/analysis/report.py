@@ -301,12 +301,12 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
     alarms = [_displacement(solution) for solution in solutions]
     if stresses:
         alarms += [_stress(solution) for solution in solutions]
-    worst: dict[str, Alarm] = {}
+    worst_alarms: dict[str, Alarm] = {}
     for alarm in alarms:
-        worst_alarm = worst.get(alarm.quantity)
+        worst_alarm = worst_alarms.get(alarm.quantity)
         if alarm.value > alarm.limit and (worst_alarm is None or alarm.value > worst_alarm.value):
-            worst[alarm.quantity] = alarm
-    return list(worst.values())
+            worst_alarms[alarm.quantity] = alarm
+    return list(worst_alarms.values())
 
 
 def _displacement(solution: Solution) -> Alarm:

@@ -278,19 +278,19 @@ def _changed_mesh(table: Table, mesh: Mesh) -> Mesh:
                 for name, box in boxes.content.items()
                 if box != _REST
             }
-            others = list(mesh_tables.values())
+            other_tables = list(mesh_tables.values())
             for name in boxes.content:
                 if name not in mesh_tables:
-                    mesh_tables[name] = partial(_beside_all, others)
+                    mesh_tables[name] = partial(_beside_all, other_tables)
             mesh = mesh.with_cell_sets(mesh_tables)
         except XcrackError as error:
             boxes.wrap(error)
     return mesh
 
 
-def _beside_all(others: Sequence[Callable[[Floats], Bools]], x: Floats) -> Bools:
+def _beside_all(other_selectors: Sequence[Callable[[Floats], Bools]], x: Floats) -> Bools:
     """Points that are in none of other parts."""
-    return ~np.any([is_inside(x) for is_inside in others], axis=0)
+    return ~np.any([is_inside(x) for is_inside in other_selectors], axis=0)
 
 
 def _material(table: Table) -> Material:

@@ -129,8 +129,8 @@ def advance_fronts(
             lines.extend((crack.fronts or ())[k] for k in members)
             continue
         path = float(np.linalg.norm(rays[0].stop - rays[0].start, axis=1).max())
-        longest = float(da[number == members[0]].max()) if body is None else path
-        strip = _strip(old_front, rays, longest, size, n_points, body)
+        longest_path = float(da[number == members[0]].max()) if body is None else path
+        strip = _strip(old_front, rays, longest_path, size, n_points, body)
         if body is not None:
             _check_reach(
                 old_front, strip.points, float(da[np.isin(number, members)].max()), size, body
@@ -232,7 +232,7 @@ def _check(crack: Crack, s: Floats, front: Ints, angle: Floats, da: Floats, size
 def _strip(
     old_front: Front,
     rays_of_front: Rays,
-    longest: float,
+    longest_path: float,
     size: float,
     n_points: int,
     body: Body | None,
@@ -244,7 +244,7 @@ def _strip(
         raise _closing_error(old_front)
     # A wave along the front is damped, beyond da of a few sides turned over, by the growth itself:
     # K is larger where the front lags behind. What longer steps overshoot more passes take away.
-    faired = faired_front(front, int(np.clip(np.ceil(_PASSES * longest / size), 1, 8)))
+    faired = faired_front(front, int(np.clip(np.ceil(_PASSES * longest_path / size), 1, 8)))
     length_before = np.linalg.norm(front.side, axis=1).sum()
     length_after = np.linalg.norm(faired.side, axis=1).sum()
     if abs(length_after - length_before) > _LOST * length_before:

@@ -186,8 +186,8 @@ def _stopped_at_fronts(
     """Ways of two fronts that lead to each other end before they meet; where they would have."""
     share = [np.ones(0) if front is None else np.ones(len(front.x)) for front in fronts]
     meeting_points = [np.zeros((0, 3))]
-    for i, rows_of_one, j, others in _facing_parts(fronts):
-        for a, p, b, q in ((i, rows_of_one, j, others), (j, others, i, rows_of_one)):
+    for i, rows_of_one, j, rows_of_other in _facing_parts(fronts):
+        for a, p, b, q in ((i, rows_of_one, j, rows_of_other), (j, rows_of_other, i, rows_of_one)):
             one, other = fronts[a], fronts[b]
             assert one is not None
             assert other is not None

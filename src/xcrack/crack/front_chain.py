@@ -143,10 +143,10 @@ def without_loops(front: FrontChain) -> FrontChain:
         )
         is_pinned_side = front.is_pinned & np.roll(front.is_pinned, -1)
         forward_share[is_pinned_side[: len(side)]] = np.inf
-        worst = int(np.argmin(forward_share))
-        if forward_share[worst] > 0:
+        worst_place = int(np.argmin(forward_share))
+        if forward_share[worst_place] > 0:
             break
-        front = _join_side_ends(front, worst)
+        front = _join_side_ends(front, worst_place)
     return front
 
 
@@ -364,15 +364,15 @@ def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, 
     """Smallest double area along the normal over longest side squared, and cosine to it."""
     a, b, c = (x[triangles[:, i]] for i in range(3))
     area = np.cross(b - a, c - a)
-    longest = np.maximum(
+    longest_side = np.maximum(
         np.maximum(((b - a) ** 2).sum(axis=1), ((c - b) ** 2).sum(axis=1)),
         ((a - c) ** 2).sum(axis=1),
     )
     projected_area, total = area @ normal, np.linalg.norm(area, axis=1)
     cosine = np.where(
-        total > _FLAT * longest, projected_area / np.where(total > 0, total, 1.0), -1.0
+        total > _FLAT * longest_side, projected_area / np.where(total > 0, total, 1.0), -1.0
     )
-    return float((projected_area / longest).min()), float(cosine.min())
+    return float((projected_area / longest_side).min()), float(cosine.min())
 
 
 def along_front(s: Floats, values: Floats, place: Floats, is_closed: bool, length: float) -> Floats:

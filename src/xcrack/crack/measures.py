@@ -248,9 +248,11 @@ def _share_below_zero(values: Floats) -> Floats:
     sorted_values = np.sort(values, axis=1)
     low, middle, high = sorted_values.T
     spread = np.where(high > low, high - low, 1.0)
-    one = low**2 / (np.where(middle > low, middle - low, 1.0) * spread)
-    two = 1 - high**2 / (spread * np.where(high > middle, high - middle, 1.0))
-    return np.asarray(np.choose(n_below, [np.zeros_like(low), one, two, np.ones_like(low)]))
+    share_of_one = low**2 / (np.where(middle > low, middle - low, 1.0) * spread)
+    share_of_two = 1 - high**2 / (spread * np.where(high > middle, high - middle, 1.0))
+    return np.asarray(
+        np.choose(n_below, [np.zeros_like(low), share_of_one, share_of_two, np.ones_like(low)])
+    )
 
 
 # Lines in which a surface meets the boundary of a body, and what lies how deep below them.

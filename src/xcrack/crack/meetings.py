@@ -274,10 +274,10 @@ def joined_cracks(
         low, high = sorted((number[c], number[other]))
         if low == high:
             continue  # they are one crack by now: it closes, which placing refuses
-        one, two = result[low], result[high]
-        assert one is not None
-        assert two is not None
-        result[low], result[high] = _crack_of_two(one, two, x), None
+        first_crack, second_crack = result[low], result[high]
+        assert first_crack is not None
+        assert second_crack is not None
+        result[low], result[high] = _crack_of_two(first_crack, second_crack, x), None
         number = [low if n == high else n for n in number]
     return [crack for crack in result if crack is not None]
 
@@ -287,25 +287,35 @@ def _with_new_end(crack: Crack, first: bool, x: Floats, replace: bool, drop: boo
     points = crack.points[::-1] if first else crack.points
     points = np.concatenate([points[:-1] if replace and len(points) > 2 else points, x[None]])
     last = len(points) - 1
-    others = [tip for tip in crack.tips or () if (tip == 0) != first]
-    tips = [0 if tip == 0 else last for tip in others]
+    other_tips = [tip for tip in crack.tips or () if (tip == 0) != first]
+    tips = [0 if tip == 0 else last for tip in other_tips]
     if not drop:
         tips.append(0 if first else last)
     return polyline_crack(points[::-1] if first else points, tuple(sorted(tips)))
 
 
-def _crack_of_two(one: Crack, two: Crack, x: Floats) -> Crack:
+def _crack_of_two(first_crack: Crack, second_crack: Crack, x: Floats) -> Crack:
     """Two cracks that end at x as one, in the direction of the first."""
-    is_begin = np.array_equal(one.points[0], x)
-    ends = two.points[::-1] if np.array_equal(two.points[0], x) == is_begin else two.points
-    free_ends = [k for k in (0, len(two.points) - 1) if not np.array_equal(two.points[k], x)]
-    tip_beyond = any(k in (two.tips or ()) for k in free_ends)
+    is_begin = np.array_equal(first_crack.points[0], x)
+    ends = (
+        second_crack.points[::-1]
+        if np.array_equal(second_crack.points[0], x) == is_begin
+        else second_crack.points
+    )
+    free_ends = [
+        k
+        for k in (0, len(second_crack.points) - 1)
+        if not np.array_equal(second_crack.points[k], x)
+    ]
+    tip_beyond = any(k in (second_crack.tips or ()) for k in free_ends)
     if is_begin:
-        points = np.concatenate([ends, one.points[1:]])
-        tips = [0] * tip_beyond + [len(points) - 1] * (len(one.points) - 1 in (one.tips or ()))
+        points = np.concatenate([ends, first_crack.points[1:]])
+        tips = [0] * tip_beyond + [len(points) - 1] * (
+            len(first_crack.points) - 1 in (first_crack.tips or ())
+        )
     else:
-        points = np.concatenate([one.points, ends[1:]])
-        tips = [0] * (0 in (one.tips or ())) + [len(points) - 1] * tip_beyond
+        points = np.concatenate([first_crack.points, ends[1:]])
+        tips = [0] * (0 in (first_crack.tips or ())) + [len(points) - 1] * tip_beyond
     return polyline_crack(points, tuple(tips))
 
 

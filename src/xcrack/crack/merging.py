@@ -88,9 +88,9 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
         feet, other_normal = nearest_point.foot[rows], tree.normal[nearest_point.triangle[rows]]
         if len(y):  # nearest where they come out of the body a foot would lie beyond it
             distance, place = cKDTree(y).query(x)
-            near = np.nonzero(distance < reach)[0]
-            rows, feet = np.append(rows, near), np.concatenate([feet, y[place[near]]])
-            other_normal = np.concatenate([other_normal, normal_there[place[near]]])
+            near_rows = np.nonzero(distance < reach)[0]
+            rows, feet = np.append(rows, near_rows), np.concatenate([feet, y[place[near_rows]]])
+            other_normal = np.concatenate([other_normal, normal_there[place[near_rows]]])
         if not len(rows):
             continue
         way = feet - x[rows]
@@ -178,7 +178,7 @@ def merged_crack(
         None,
         tuple(front + n for front in other.fronts or ()),
     )
-    both = Crack(shifted.points, np.concatenate([one.faces, shifted.faces]))
+    both_cracks = Crack(shifted.points, np.concatenate([one.faces, shifted.faces]))
     trees = tuple(triangle_tree(c.points, c.faces) for c in (other, one))
 
     def find_blocked(tree: TriangleTree) -> Callable[[Front], Bools]:
@@ -188,13 +188,15 @@ def merged_crack(
     flags = tuple(map(find_blocked, trees))
 
     if body is None:
-        return _with_gap_closed(both, facing_fronts, (), flags, radius, size)
+        return _with_gap_closed(both_cracks, facing_fronts, (), flags, radius, size)
 
     def close_gap(count: int) -> Crack:
         short_fronts = tuple(
             [_with_short_ends(f, count, body) for f in group] for group in facing_fronts
         )
-        return _with_gap_closed(both, (short_fronts[0], short_fronts[1]), (), flags, radius, size)
+        return _with_gap_closed(
+            both_cracks, (short_fronts[0], short_fronts[1]), (), flags, radius, size
+        )
 
     return _first_that_closes(close_gap, facing_fronts)
 
@@ -453,8 +455,8 @@ def _meets_in_hole(fronts: Sequence[Front], body: Body) -> bool:
     gap = np.linalg.norm(last[:, None] - first[None], axis=2)
     i, j = np.nonzero(gap < _LOOSE * body.cell_size(last)[:, None])
     normal = np.array([front.frame[-1, 1] for front in open_ones])
-    both = is_enclosed(last[i], normal[i], body) & is_enclosed(first[j], normal[i], body)
-    return bool(both.any())
+    is_met = is_enclosed(last[i], normal[i], body) & is_enclosed(first[j], normal[i], body)
+    return bool(is_met.any())
 
 
 def _thirds(front: Front) -> tuple[Front, Front] | None:
@@ -482,8 +484,8 @@ def _ends_outside(front: Front, body: Body) -> list[tuple[int, int]]:
     if front.closed or not is_inside.any():
         return []
     places = np.nonzero(is_inside)[0]
-    both = ((int(places[0]), 0), (int(places[-1]), -1))
-    return [(place, end) for place, end in both if not is_inside[end]]
+    end_places = ((int(places[0]), 0), (int(places[-1]), -1))
+    return [(place, end) for place, end in end_places if not is_inside[end]]
 
 
 def _meeting_ends(one: Front, other: Front, body: Body) -> tuple[int, int, Floats] | None:
@@ -547,7 +549,7 @@ def _join(
     def find_blocked(k: int, fronts: tuple[Front, Front]) -> Callable[[Front], Bools]:
         other = fronts[1 - k]
 
-        def ahead(front: Front) -> Bools:
+        def is_ahead(front: Front) -> Bools:
             centre = front.x + radius * front.frame[:, 0]
             r, segment, _ = front_distance(centre, other.x, other.closed, radius)
             flag = (segment >= 0) & (r < radius * (1 - 1e-9))
@@ -557,7 +559,7 @@ def _join(
                 flag[inner_rows[-1] + 1 :] = ends is not None and ends[k] == -1
             return np.asarray(flag)
 
-        return ahead
+        return is_ahead
 
     def close_gap(count: int) -> Crack:
         short_pair = (
@@ -604,23 +606,23 @@ def _with_gap_closed(
     size: float,
 ) -> Crack:
     """A crack with faces between those pieces of two groups of fronts that face each other."""
-    runs, others = (
+    runs, other_runs = (
         [(front, run) for front in group for run in _runs(front, is_blocked(front))]
         for group, is_blocked in zip(pair, blocked_by)
     )
-    if not runs or len(runs) != len(others):
+    if not runs or len(runs) != len(other_runs):
         raise GeometryError(
-            f"{len(runs)} and {len(others)} pieces of the fronts of two cracks face each other: "
-            "the gap between them cannot be closed."
+            f"{len(runs)} and {len(other_runs)} pieces of the fronts of two cracks face each "
+            "other: the gap between them cannot be closed."
         )
     points, faces = [crack.points], [crack.faces]
     every = (*pair[0], *pair[1], *rest)
     next_number = dict(side for front in every for side in _sides(front))
     count = len(crack.points)
     for front, run in runs:
-        facing_run = others.pop(_facing_number(front, run, others))
+        facing_run = other_runs.pop(_facing_number(front, run, other_runs))
         patch = _patch(front, run, *facing_run, radius, size, count)
-        for number in patch.used:
+        for number in patch.used_faces:
             next_number.pop(int(number), None)
         next_number.update(patch.sides)
         points.append(patch.points)
@@ -652,7 +654,7 @@ class _Patch:
     points: Floats
     faces: Ints
     sides: dict[int, int]
-    used: Ints
+    used_faces: Ints
 
 
 def _blocked_points(front: Front, tree: TriangleTree, radius: float, step: float) -> Bools:
@@ -697,12 +699,14 @@ def _sides(front: Front) -> list[tuple[int, int]]:
     return list(zip(number, next_number))
 
 
-def _facing_number(front: Front, run: FacingPart, others: list[tuple[Front, FacingPart]]) -> int:
+def _facing_number(
+    front: Front, run: FacingPart, other_runs: list[tuple[Front, FacingPart]]
+) -> int:
     """Number of the piece of the other crack's fronts that faces this one."""
     middle = front.x[list(run.place)].mean(axis=0)
     distances = [
         float(np.linalg.norm(other.x[list(piece.place)].mean(axis=0) - middle))
-        for other, piece in others
+        for other, piece in other_runs
     ]
     return int(np.argmin(distances))
 

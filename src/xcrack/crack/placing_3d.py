@@ -112,9 +112,9 @@ def _rounded_loop(x: Floats, loop: Ints, radius_at: dict[int, float]) -> Floats:
             continue
         gap = np.abs(at - s[i])
         gap = np.minimum(gap, total - gap)
-        others = np.sort(gap)[1:]
+        other_gaps = np.sort(gap)[1:]
         half = np.arccos(np.clip(turn[i], -1, 1)) / 2
-        reach = min(radius * np.tan(half), _ROOM * float(np.min(others, initial=total / 2)))
+        reach = min(radius * np.tan(half), _ROOM * float(np.min(other_gaps, initial=total / 2)))
         arc = _arc(x, s, int(i), reach, half)
         distance = np.abs(s[:-1] - s[i])
         distance = np.minimum(distance, total - distance)
@@ -179,10 +179,11 @@ def _triangles_within(
         corner = plane_points[faces]
         area = cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         faces = np.where(area[:, None] < 0, faces[:, ::-1], faces)
-        longest = np.max(np.sum((corner - np.roll(corner, 1, axis=1)) ** 2, axis=2), axis=1)
+        longest_square = np.max(np.sum((corner - np.roll(corner, 1, axis=1)) ** 2, axis=2), axis=1)
         # Three points of a straight side leave triangles that are round-off.
         faces = faces[
-            (np.abs(area) > 1e-9 * longest) & is_within(corner.mean(axis=1), plane_points[edges])
+            (np.abs(area) > 1e-9 * longest_square)
+            & is_within(corner.mean(axis=1), plane_points[edges])
         ]
         rim = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)]
         outer = {(int(b), int(a)) for a, b in rim}

@@ -297,8 +297,8 @@ def surface_crack(
 
 def _check_shape(x: Floats, faces: Ints) -> None:
     corner = x[faces]
-    longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    is_thin = face_areas(x, faces) <= 1e-10 * longest**2
+    longest_side = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    is_thin = face_areas(x, faces) <= 1e-10 * longest_side**2
     if is_thin.any():
         face = int(np.argmax(is_thin))
         raise GeometryError(

@@ -286,8 +286,8 @@ def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -
             other[group] = ~other[group]
             pressure_change = of_set(groups.dual, gap_without_group, other)[0] - pressure
             changes.append(np.abs(duals.per_pressure.T @ pressure_change))
-        both = changes[0] + changes[1]
-        total += changes[0] * changes[1] / np.where(both > 0, both, 1.0)
+        change_sum = changes[0] + changes[1]
+        total += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)
     return total
 
 

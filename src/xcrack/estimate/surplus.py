@@ -84,7 +84,7 @@ def surplus(space: FunctionSpace, is_fixed: Bools) -> HierarchicalSurplus:
         jumps[functions_of_crack], crack[functions_of_crack] = True, c
         is_whole[functions[cut.is_tip]] = False
     for joint in space.joints:
-        is_whole[functions[joint.both]] = False
+        is_whole[functions[joint.is_in_both]] = False
     jumps &= is_whole
     copy = np.full(n, -1, dtype=np.int64)
     copy[jumps] = n + np.arange(int(jumps.sum()))

@@ -317,9 +317,9 @@ def _angle_and_range(
 ) -> tuple[Floats, Floats, Floats]:
     """The chosen angle with the range and the ratio R that go with it."""
     K_eq = _equivalent_K(K, angle, nu)
-    largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
-    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
-    difference = largest - smallest
+    largest_K, smallest_K = K_eq.max(axis=0), K_eq.min(axis=0)
+    R = np.divide(smallest_K, largest_K, out=np.zeros_like(largest_K), where=largest_K > 0)
+    difference = largest_K - smallest_K
     component = _component_range(K, angle, nu)
     if range == "component":
         return angle, component, R
@@ -380,10 +380,10 @@ def nominal_range(K: Floats, angle: Floats, nu: float | Floats) -> tuple[Floats,
     K_eq = cos**2 * (K[..., 0] * cos - 3 * K[..., 1] * sin)
     if K.shape[-1] == 3:
         K_eq = np.where(K_eq >= 0, np.hypot(K_eq, K[..., 2] / np.sqrt(1 - nu)), K_eq)
-    largest, smallest = K_eq.max(axis=0), K_eq.min(axis=0)
-    is_opening = largest > 0
-    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=is_opening)
-    return np.where(is_opening, largest - smallest, 0.0), R
+    largest_K, smallest_K = K_eq.max(axis=0), K_eq.min(axis=0)
+    is_opening = largest_K > 0
+    R = np.divide(smallest_K, largest_K, out=np.zeros_like(largest_K), where=is_opening)
+    return np.where(is_opening, largest_K - smallest_K, 0.0), R
 
 
 # --- K at the tip of a kink of no length, and where a criterion turns it no further ---

@@ -411,9 +411,9 @@ def cycle_rates(
     """Rates `(k, n, p, s)` with a share of K_max taken from both ends of each cycle."""
     K_max = largest_K(cycles.dK, cycles.R)[..., None]
     largest = K_max * (1 - shifts)
-    smallest = np.maximum(K_max - cycles.dK[..., None] - K_max * shifts, 0.0)
-    dK = np.where(shifts == 0, cycles.dK[..., None], largest - smallest)
-    R = np.divide(smallest, largest, out=np.zeros_like(largest), where=largest > 0)
+    K_min = np.maximum(K_max - cycles.dK[..., None] - K_max * shifts, 0.0)
+    dK = np.where(shifts == 0, cycles.dK[..., None], largest - K_min)
+    R = np.divide(K_min, largest, out=np.zeros_like(largest), where=largest > 0)
     R = np.where(shifts == 0, cycles.R[..., None], np.minimum(R, 1.0))
     a = np.broadcast_to(cycles.a[..., None, None], dK.shape)
     columns = (np.ascontiguousarray(each).ravel() for each in (dK, R, a))

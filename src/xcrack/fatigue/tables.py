@@ -154,10 +154,10 @@ def _check_pair(low: Curve, high: Curve) -> None:
         )
     m = 1 + (one - other) / np.log((1 - high[0]) / (1 - low[0]))
     if (m < -_ROUND_OFF).any() or (m > 1 + _ROUND_OFF).any():
-        worst = int(np.argmax(np.abs(m - 0.5)))
+        worst_row = int(np.argmax(np.abs(m - 0.5)))
         raise ProblemError(
             f"rate_table: the curves of R = {low[0]:g} and {high[0]:g} have Walker's exponent "
-            f"{m[worst]:.3g} at the rate {np.exp(rates[worst]):.3g}: it must lie in [0, 1]."
+            f"{m[worst_row]:.3g} at the rate {np.exp(rates[worst_row]):.3g}: it must lie in [0, 1]."
         )
 
 

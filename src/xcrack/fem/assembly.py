@@ -581,8 +581,8 @@ def enriched_stiffness(
         return Enriched(indptr, indices, np.zeros((0, d, d))), 0, None
     has_one_jump = with_one_jump(space, cells)
     reused, n_points = reused_cells(space, elasticity, cells[has_one_jump], previous_cells)
-    others = cells[~has_one_jump]
-    points = cell_points(space, others, numerics.points, _degree(space.order, elasticity))
+    other_cells = cells[~has_one_jump]
+    points = cell_points(space, other_cells, numerics.points, _degree(space.order, elasticity))
     with_tip = cells[space.has_tip[cells]]
     boundary = None
     if numerics.consistent and len(with_tip):
@@ -616,7 +616,7 @@ def enriched_stiffness(
 
     tasks = (
         (material, batch)
-        for chunk in _chunks(space, points, others)
+        for chunk in _chunks(space, points, other_cells)
         for material, group in elasticity.groups(chunk)
         for batch, _ in space.batches(group)
     )

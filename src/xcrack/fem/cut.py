@@ -120,9 +120,9 @@ def _tip_cells(
     fraction = np.abs(np.linalg.det(b))
     keep = fraction > _ROUND_OFF
     subs = (np.array(owner)[keep], b[keep], fraction[keep], np.array(side, dtype=np.int64)[keep])
-    both = np.array(lip_cells, dtype=np.int64)
-    two = np.array(lip_bary, dtype=float).reshape(-1, 2, 3)
-    return subs, (both, two), np.array(entries, dtype=np.int64)
+    parent_cells = np.array(lip_cells, dtype=np.int64)
+    ends_of_lips = np.array(lip_bary, dtype=float).reshape(-1, 2, 3)
+    return subs, (parent_cells, ends_of_lips), np.array(entries, dtype=np.int64)
 
 
 def lips_up_to_tips(
@@ -215,7 +215,7 @@ def _front_subs(
     at = (1 - t) * level_set.inside[a] + t * level_set.inside[b]
     size = np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
     with np.errstate(invalid="ignore"):
-        entry = edges[(at < -_AT * size) & level_set.near[edges]]
+        entry = edges[(at < -_AT * size) & level_set.is_near[edges]]
     return (cells[owner], bary, share, side), (cells[lip_owner[row]], lips), entry
 
 
@@ -416,7 +416,7 @@ def cut(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> Cut:
     lip, owner = interface_simplices(values[candidates], corner_places(mesh, level_set, candidates))
     psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
     sign_change = has_position[mesh.cell_to_edge[candidates]]
-    is_close = (level_set.near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
+    is_close = (level_set.is_near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
     is_through = is_close & (np.bincount(owner, psi, len(candidates)) < 0)
     cells = candidates[is_through]
 

@@ -136,14 +136,14 @@ def front_radii(
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
             is_closed = bool(numbers[0] == numbers[-1])
             room = _ASIDE * _to_sides(body, every[c][k], is_closed)
-            others = [
+            other_fronts = [
                 x
                 for d, fronts_of_crack in enumerate(every)
                 for j, x in enumerate(fronts_of_crack)
                 if (d, j) != (c, k) and not are_opposite(cracks[d], crack)
             ]
-            if others:
-                nearest = cKDTree(np.concatenate(others)).query(every[c][k])[0]
+            if other_fronts:
+                nearest = cKDTree(np.concatenate(other_fronts)).query(every[c][k])[0]
                 room = min(room, _APART * float(nearest.min()))
             if radius is None:
                 share_of_size = min(_SHARE_OF_FRONT * (2 if is_closed else 1) * size, room)
@@ -245,10 +245,10 @@ def divided_points(mesh: Mesh, crack: Crack, cut: Cut, flags: list[Bools]) -> li
         for i, other in enumerate(ends[:j]):
             gap = float(np.linalg.norm(one - other[::-1], axis=1).min())
             if gap < _RUNS_ON * leg_size(mesh, cut.level_set.tip_cells[j]):
-                both = result[i] & result[j]
+                common_points = result[i] & result[j]
                 is_nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])
-                result[i] = result[i] & ~(both & ~is_nearer)
-                result[j] = result[j] & ~(both & is_nearer)
+                result[i] = result[i] & ~(common_points & ~is_nearer)
+                result[j] = result[j] & ~(common_points & is_nearer)
     return result
 
 

@@ -59,8 +59,8 @@ def nodes_around_point(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools
 
 def nodes_along_line(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
     """Nodes in 3D next to cells that both cracks cut `(nodes,)`, twice."""
-    both = _nodes_of(space, joint.both)
-    inner = _nodes_of(space, np.asarray(both[space.cell_nodes].any(axis=1)))
+    nodes_of_both = _nodes_of(space, joint.is_in_both)
+    inner = _nodes_of(space, np.asarray(nodes_of_both[space.cell_nodes].any(axis=1)))
     return inner, inner
 
 

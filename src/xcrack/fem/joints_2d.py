@@ -38,7 +38,7 @@ class Joint:
         Around the centre; infinite in 3D.
     is_near : (m,) array of bool
         Cells in which sides are those of the junction.
-    both : (m,) array of bool
+    is_in_both : (m,) array of bool
         Cells cut by both cracks.
     """
 
@@ -49,7 +49,7 @@ class Joint:
     centre: Floats
     reach: float
     is_near: Bools
-    both: Bools
+    is_in_both: Bools
 
 
 def joined_cuts(
@@ -78,7 +78,7 @@ def _joined_pair(
     values = np.abs(_at(mesh, ending.level_set.phi, split.lip_cell[:, 1], split.lip_bary[:, 1]))
     distance = np.linalg.norm(lips - junction.x, axis=2) + values
     x = lips.reshape(-1, 2)[int(np.argmin(distance))]
-    clipped_cut, both = _clipped_cut(mesh, through_cut, ending, junction, is_near)
+    clipped_cut, is_in_both = _clipped_cut(mesh, through_cut, ending, junction, is_near)
     joint = Joint(
         junction.crack,
         junction.on,
@@ -87,7 +87,7 @@ def _joined_pair(
         junction.x,
         junction.reach,
         lock(is_near),
-        lock(both),
+        lock(is_in_both),
     )
     return split, clipped_cut, joint
 
@@ -163,16 +163,16 @@ def _clipped_cut(
     is_discarded = np.zeros(len(mesh.cells), dtype=bool)
     is_discarded[cell[~keep & (cell == ending.lip_cell[:, 1])]] = True
     cells = ending.cells[~is_discarded[ending.cells]]
-    both = np.zeros(len(mesh.cells), dtype=bool)
-    both[cells] = through_cut.is_cut[cells] & is_near[cells]
-    subs = ~(is_discarded | both)[ending.sub_to_cell]
-    one, two = mesh.edges.T
+    is_in_both = np.zeros(len(mesh.cells), dtype=bool)
+    is_in_both[cells] = through_cut.is_cut[cells] & is_near[cells]
+    subs = ~(is_discarded | is_in_both)[ending.sub_to_cell]
+    begin, end = mesh.edges.T
     t = ending.cut_edge
     # At a kink the other crack cuts an edge elsewhere than where phi is zero.
     other = through_cut.cut_edge
     with np.errstate(invalid="ignore"):
-        at_cut = np.where(t < other, phi[one], phi[two])
-    at_cut = np.where(np.isnan(other), (1 - t) * phi[one] + t * phi[two], at_cut) * side
+        at_cut = np.where(t < other, phi[begin], phi[end])
+    at_cut = np.where(np.isnan(other), (1 - t) * phi[begin] + t * phi[end], at_cut) * side
     is_close = (
         np.linalg.norm(mesh.points[mesh.edges].mean(axis=1) - junction.x, axis=1) < junction.reach
     )
@@ -191,7 +191,7 @@ def _clipped_cut(
         lip_normal=lock(ending.lip_normal[keep]),
         cut_edge=lock(cut_edge),
         side=lock(sides),
-    ), both
+    ), is_in_both
 
 
 def _split_cut(

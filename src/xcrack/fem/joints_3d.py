@@ -40,18 +40,18 @@ def joined_cuts(
         is_gone = cuts[junction.on].side == -junction.side
         is_gone |= _all_beyond(mesh, through_cut, ending, junction.side)
         is_active = (ending.is_cut | ending.is_tip | _beside_faces(mesh, ending)) & ~is_gone
-        both = is_active & through_cut.is_cut
-        is_joined = both | (is_active & _beside_faces(mesh, through_cut))
+        is_in_both = is_active & through_cut.is_cut
+        is_joined = is_in_both | (is_active & _beside_faces(mesh, through_cut))
         _check(mesh, through_cut, ending, junction, is_active, is_joined)
         result[junction.on] = _split_cut(mesh, through_cut, ending, is_joined)
         result[junction.crack] = _clipped_cut(
-            mesh, through_cut, ending, junction.side, is_gone, both
+            mesh, through_cut, ending, junction.side, is_gone, is_in_both
         )
         every = np.ones(len(mesh.cells), dtype=bool)
         joints.append(
             Joint(
                 junction.crack, junction.on, junction.side, lock(np.array(junction.x)),
-                lock(np.array(junction.x)), np.inf, lock(every), lock(both),
+                lock(np.array(junction.x)), np.inf, lock(every), lock(is_in_both),
             )
         )  # fmt: skip
     return tuple(result), tuple(joints)
@@ -163,24 +163,24 @@ def _parts(value: Floats, bary: Floats, x: Floats) -> tuple[Floats, Ints, Ints]:
 
 
 def _clipped_cut(
-    mesh: Mesh, through_cut: Cut, ending: Cut, side: int, is_gone: Bools, both: Bools
+    mesh: Mesh, through_cut: Cut, ending: Cut, side: int, is_gone: Bools, is_in_both: Bools
 ) -> Cut:
     """The cut of the arm, without what lies beyond the other crack."""
     phi = through_cut.level_set.phi
     cell = ending.lip_cell[:, 0]
     value = _at(mesh, phi, cell, ending.lip_bary[:, 0]) * side
     low, high = value.min(axis=1), value.max(axis=1)
-    clips = both[cell]
+    clips = is_in_both[cell]
     keep = ~is_gone[cell] & (~clips | ((low >= 0) & (high > 0)))
     rows = np.nonzero(clips & (low < 0) & (high > 0))[0]
     x = ending.lip_points(mesh)[rows]
     bary, part_side, parent = _parts(value[rows], ending.lip_bary[rows], x)
     is_before = part_side > 0
     source = np.concatenate([np.nonzero(keep)[0], rows[parent[is_before]]])
-    subs = ~(is_gone | both)[ending.sub_to_cell]
-    one, two = mesh.edges.T
+    subs = ~(is_gone | is_in_both)[ending.sub_to_cell]
+    begin, end = mesh.edges.T
     t = ending.cut_edge
-    at_cut = ((1 - t) * phi[one] + t * phi[two]) * side
+    at_cut = ((1 - t) * phi[begin] + t * phi[end]) * side
     with np.errstate(invalid="ignore"):
         cut_edge = np.where(at_cut < 0, np.nan, t)
     return replace(

@@ -37,7 +37,7 @@ class LevelSet:
     mouth : (n,) array, length
         Positive where a point is nearest to the prolongation of a mouth: across a hole, say, the
         line of a crack runs on, but not the crack.
-    near : (e,) array of bool
+    is_near : (e,) array of bool
         Edges short enough to be crossed by the crack where phi changes its sign; a change far
         from the crack (behind a strong turn) is no cut.
     line : (n, 2) array, length
@@ -49,7 +49,7 @@ class LevelSet:
     tip_cells: tuple[Ints, ...]
     tip: Floats
     mouth: Floats
-    near: Bools
+    is_near: Bools
     line: Floats = field(default_factory=lambda: lock(np.zeros((0, 2))))
 
     @property
@@ -595,8 +595,8 @@ def _chords(mesh: Mesh, phi: Floats, psi: Floats, cells: Ints) -> tuple[Floats, 
         ends.append(np.where(hit[:, None], x, np.nan))
     points = np.stack(ends, axis=1)
     hits = ~np.isnan(points[:, :, 0])
-    two = np.nonzero(hits.sum(axis=1) == 2)[0]
-    pair = points[two][hits[two]].reshape(-1, 2, 3)
+    crossed_twice = np.nonzero(hits.sum(axis=1) == 2)[0]
+    pair = points[crossed_twice][hits[crossed_twice]].reshape(-1, 2, 3)
     length = np.linalg.norm(pair[:, 1] - pair[:, 0], axis=1)
     return pair.mean(axis=1)[length > 0], length[length > 0]
 

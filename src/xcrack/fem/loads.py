@@ -397,9 +397,9 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
         phi = cut.level_set.phi
         is_touched = np.zeros((2, space.mesh.n_points), dtype=bool)
         for corner in range(facets.shape[1]):
-            others = np.delete(phi[facets], corner, axis=1)
-            is_touched[0, facets[(others < 0).any(axis=1), corner]] = True
-            is_touched[1, facets[(others > 0).any(axis=1), corner]] = True
+            other_values = np.delete(phi[facets], corner, axis=1)
+            is_touched[0, facets[(other_values < 0).any(axis=1), corner]] = True
+            is_touched[1, facets[(other_values > 0).any(axis=1), corner]] = True
         ends = (phi == 0) & (space.heaviside[c][: space.mesh.n_points] >= 0)
         is_cut_off = ends & is_touched[0] & ~is_touched[1]
         if is_cut_off.any():

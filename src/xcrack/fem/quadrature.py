@@ -265,8 +265,8 @@ def _halves(space: FunctionSpace, nodes: Ints, bary: Floats, x: Floats) -> tuple
     length = np.linalg.norm(x[:, i] - x[:, j], axis=2)
     longest_edge = length.max(axis=1, keepdims=True)
     middle = radius_at(space, nodes, (bary[:, i] + bary[:, j]) / 2) / longest_edge
-    longest = length >= (1 - _SAME) * longest_edge
-    edge = np.where(longest, np.round(middle, 7), np.inf).argmin(axis=1)
+    is_longest = length >= (1 - _SAME) * longest_edge
+    edge = np.where(is_longest, np.round(middle, 7), np.inf).argmin(axis=1)
     a, b, row = i[edge], j[edge], np.arange(len(x))
     halves = []
     for values in (bary, x):
@@ -454,8 +454,8 @@ def part_numbers(space: FunctionSpace, cell: Ints, sides: Ints) -> Ints:
         is_above_crack = cut.is_cut[cell] & (sides[:, c] > 0)
         for joint in space.joints:
             if joint.crack == c:
-                is_beside |= is_above_crack & joint.both[cell]
-                is_above_crack = is_above_crack & ~joint.both[cell]
+                is_beside |= is_above_crack & joint.is_in_both[cell]
+                is_above_crack = is_above_crack & ~joint.is_in_both[cell]
         is_above |= is_above_crack
     return is_above + 2 * is_beside.astype(np.int64)
 
@@ -564,7 +564,7 @@ def _sub_cells_at_joints(space: FunctionSpace, subs: SubCells) -> SubCells:
     """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
     for joint in space.joints:
         phi = space.cuts[joint.crack].level_set.phi
-        chosen = joint.both[subs.cell] & (subs.side[:, joint.on] == joint.side)
+        chosen = joint.is_in_both[subs.cell] & (subs.side[:, joint.on] == joint.side)
         subs = _split_along(space, subs, phi, chosen, _ROUND_OFF)
     if space.dim == 3:
         subs = _sub_cells_at_ends_of_fronts(space, subs)
@@ -577,7 +577,9 @@ def _sub_cells_at_ends_of_fronts(space: FunctionSpace, subs: SubCells) -> SubCel
     for joint in space.joints:
         cut = space.cuts[joint.crack]
         for psi in cut.level_set.psi:
-            chosen = (joint.both & cut.is_tip)[subs.cell] & (subs.side[:, joint.on] == joint.side)
+            chosen = (joint.is_in_both & cut.is_tip)[subs.cell] & (
+                subs.side[:, joint.on] == joint.side
+            )
             subs = _split_along(space, subs, psi, chosen, _AT)
     return subs
 

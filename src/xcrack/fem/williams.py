@@ -11,8 +11,8 @@ def polar_coordinates(psi: Floats, phi: Floats, side: Ints) -> tuple[Floats, Flo
     `side` is +1 or -1 where the point belongs to a known side of the crack, else 0. A point with
     phi = 0 exactly has atan2 = +pi on both crack faces; its side decides.
     """
-    smallest = 1e-300
-    phi_on_side = np.where((side != 0) & (phi * side <= 0), side * smallest, phi)
+    least_radius = 1e-300
+    phi_on_side = np.where((side != 0) & (phi * side <= 0), side * least_radius, phi)
     return np.hypot(psi, phi), np.arctan2(phi_on_side, psi)
 
 

@@ -30,7 +30,7 @@ from xcrack.growth.rates import Rates, rates_by_law_of
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
 from xcrack.growth.step import Corrected, Plan, Step, StepError, moved_places, plan_of, solves_of
-from xcrack.growth.step_length import longest
+from xcrack.growth.step_length import longest_advance
 from xcrack.mesh.locate import cell_sizes
 
 _SAME = 1e-6  # of the coordinates: a tip recognised after its advance
@@ -48,7 +48,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     if fastest_rate == 0 or np.isinf(fastest_rate):
         return plan
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest_rate
-    largest = float(min(longest(rule, step.control), by_cycles))
+    largest = float(min(longest_advance(rule, step.control), by_cycles))
     score = _score(rule, step)
     growth = stations.growth(score, largest)
     is_growing = growth >= ends.waits_below * cell

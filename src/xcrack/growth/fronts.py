@@ -48,7 +48,7 @@ from xcrack.growth.rates import Rates, block_order, kinds_of
 from xcrack.growth.solves import SolveHistory
 from xcrack.growth.stations import GrowthStations, Identities, directions
 from xcrack.growth.step import Corrected, Plan, Step, StepError, plan_of, solves_of
-from xcrack.growth.step_length import first_control, longest, next_control, share_left
+from xcrack.growth.step_length import first_control, longest_advance, next_control, share_left
 from xcrack.mesh.distances import front_distance
 from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.mesh import Mesh
@@ -328,7 +328,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         is_arrested = rule.retardation is not None and fastest_rate == 0
         return replace(plan, limit="arrest" if is_arrested else "")
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest_rate
-    largest = float(min(longest(rule, step.control), by_cycles))
+    largest = float(min(longest_advance(rule, step.control), by_cycles))
     row = int(np.argmax(rate))
     growth = stations.growth(rate, largest)
     is_growing = growth >= WAITS_BELOW * cell

@@ -168,14 +168,14 @@ def _kinds(rule: GrowthRule) -> Ints:
 def _hits(facets: Floats, x: Floats, direction: Floats, largest_way: float) -> Floats:
     """Lengths at which a straight way passes facets `(k, d, d)`, rising."""
     if len(x) == 3:
-        one, two = facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0]
-        normal, gap = np.cross(one, two), facets[:, 0] - x
+        first_side, second_side = facets[:, 1] - facets[:, 0], facets[:, 2] - facets[:, 0]
+        normal, gap = np.cross(first_side, second_side), facets[:, 0] - x
         with np.errstate(divide="ignore", invalid="ignore"):
             distance = np.einsum("ki,ki->k", gap, normal) / (normal @ direction)
             place = distance[:, None] * direction - gap
             size = np.einsum("ki,ki->k", normal, normal)
-            u = np.einsum("ki,ki->k", np.cross(place, two), normal) / size
-            v = np.einsum("ki,ki->k", np.cross(one, place), normal) / size
+            u = np.einsum("ki,ki->k", np.cross(place, second_side), normal) / size
+            v = np.einsum("ki,ki->k", np.cross(first_side, place), normal) / size
         is_inside = (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9)
         return np.unique(distance[is_inside & (distance > 0) & (distance < largest_way)])
     start, side = facets[:, 0], facets[:, 1] - facets[:, 0]
@@ -340,8 +340,12 @@ def mixed_solves(
     kinds = solves_before.kinds
     if kinds is not None and solves_after.kinds is not None:
         dK, R, a = (
-            np.where(is_passed.reshape(1, -1, *[1] * (two.ndim - 2)), two, one)
-            for one, two in zip(kinds.arrays, solves_after.kinds.arrays, strict=True)
+            np.where(
+                is_passed.reshape(1, -1, *[1] * (value_after.ndim - 2)), value_after, value_before
+            )
+            for value_before, value_after in zip(
+                kinds.arrays, solves_after.kinds.arrays, strict=True
+            )
         )
         if kinds.sets is not None:
             sets = np.where(is_passed, sets, kinds.sets)

@@ -444,10 +444,10 @@ def _arms_to_be(
     cracks: Sequence[Crack], pair: tuple[int, int], body: Body
 ) -> Iterator[tuple[FaceAhead, Crack | None]]:
     """Faces ahead of the fronts of either of two cracks; then those of fronts that are led on."""
-    both = (pair, pair[::-1])
-    faces_met = [face_ahead(cracks, c, on, body, _AHEAD) for c, on in both]
+    pair_orders = (pair, pair[::-1])
+    faces_met = [face_ahead(cracks, c, on, body, _AHEAD) for c, on in pair_orders]
     yield from ((one, None) for one in sorted(filter(None, faces_met), key=lambda one: one.width))
-    faces_beside = (_face_beside(cracks, c, on, body) for c, on in both)
+    faces_beside = (_face_beside(cracks, c, on, body) for c, on in pair_orders)
     yield from (each[1:] for each in sorted(filter(None, faces_beside), key=lambda each: each[0]))
 
 
@@ -537,12 +537,12 @@ def _met_face(
         cracks_now = plan.cracks if share == 1.0 else _cracks_after(rule, step, plan, share)
         if _cross(cracks_now, i, k, body):
             return FaceAhead(i, k, 0.0, 1.0, np.zeros(3))
-        both = ((i, k), (k, i))
+        pair_orders = ((i, k), (k, i))
         if is_beside:
-            faces_beside = (_face_beside(cracks_now, *pair, body) for pair in both)
+            faces_beside = (_face_beside(cracks_now, *pair, body) for pair in pair_orders)
             nearest = min(filter(None, faces_beside), key=lambda each: each[0], default=None)
             return None if nearest is None else nearest[1]
-        faces_ahead = (face_ahead(cracks_now, *pair, body, _AHEAD) for pair in both)
+        faces_ahead = (face_ahead(cracks_now, *pair, body, _AHEAD) for pair in pair_orders)
         return min(filter(None, faces_ahead), key=lambda one: one.width, default=None)
 
     def is_near(face: FaceAhead, share: float = 1.0) -> bool:

@@ -202,17 +202,17 @@ def _levels_that_matter(
         table_after = LevelTable(np.array(all_levels), K, is_smooth=True)
         largest = max(float(np.abs(K).max()), np.finfo(float).tiny)
         error = np.abs(K[~is_old] - table_before.at(np.array(middle))).max(axis=2) / largest
-        one, two = (
+        growth_before, growth_after = (
             _growths(ladder, factors, pairs, count) for ladder in (table_before, table_after)
         )
-        difference = np.abs(two - one)
+        difference = np.abs(growth_after - growth_before)
         rows = []
         for k in numbers:
             is_inside = (factors > levels[k]) & (factors < levels[k + 1])
             rows.append(difference[is_inside[pairs].any(axis=0)].sum(axis=0))
         relative_error = np.concatenate([relative_error, error], axis=1)
         change = np.concatenate([change, np.array(rows).reshape(len(middle), -1)], axis=1)
-        growth = np.concatenate([growth, two.sum(axis=0)])
+        growth = np.concatenate([growth, growth_after.sum(axis=0)])
     least_change = _GROWTH * spectrum.tolerance * float(growth.max(initial=0.0))
     return np.asarray(((relative_error > spectrum.tolerance) & (change > least_change)).any(axis=1))
 

@@ -570,7 +570,7 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
     if not len(ranges_left_out) or spectrum.least_range == 0:
         return 0.0
     values, count, _ = distinct_cycles(ranges_left_out)
-    worst = 0.0
+    largest_share = 0.0
     every = pairs_of(rule, problem, response)
     for c, ladder in enumerate(ladders(problem, spectrum, response)):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
@@ -588,8 +588,8 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
         rows_that_grow = np.nonzero(growth[0])[0]
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = growth[0][rows_that_grow] / growth[1][rows_that_grow]
-        worst = max(worst, float(ratio.max(initial=0.0)))
-    return worst
+        largest_share = max(largest_share, float(ratio.max(initial=0.0)))
+    return largest_share
 
 
 # The kinds of cycles of a block, for growth cycle by cycle.

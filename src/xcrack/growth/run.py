@@ -404,7 +404,7 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
 
     plan = plan_of(last)
     least_length = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip])
-    longest = plan.length * plan.part
+    planned_length = plan.length * plan.part
 
     def length_beyond(length: float) -> float:
         return size_beyond(rule, _scene(rule, _with_length(rule, last, length)).sizes)
@@ -415,18 +415,22 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
             size_beyond(rule, last.sizes),
         )
         if at_end <= _SAME:
-            slope = (at_end - at_begin) / longest
+            slope = (at_end - at_begin) / planned_length
             is_there = (
-                at_end >= -_SAME or longest < 2 * least_length or -at_end >= slope * least_length
+                at_end >= -_SAME
+                or planned_length < 2 * least_length
+                or -at_end >= slope * least_length
             )
             return (
                 last
                 if is_there
-                else _with_length(rule, last, longest - least_length - at_end / slope)
+                else _with_length(rule, last, planned_length - least_length - at_end / slope)
             )
         if length_beyond(least_length) >= 0:
             return _with_length(rule, last, least_length)
-        length = brentq(length_beyond, least_length, longest, xtol=_SAME * least_length, rtol=1e-15)
+        length = brentq(
+            length_beyond, least_length, planned_length, xtol=_SAME * least_length, rtol=1e-15
+        )
         return _with_length(rule, last, length)
     except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
         return last

@@ -107,7 +107,7 @@ def next_length(
     return float(max(length * factor, least_length))
 
 
-def longest(rule: GrowthRule, control: StepControl) -> float:
+def longest_advance(rule: GrowthRule, control: StepControl) -> float:
     """Largest advance of any end in the next step, length; inf where only cycles limit it."""
     return min(np.inf if rule.da is None else rule.da, control.length)
 
@@ -199,7 +199,7 @@ __all__ = [
     "first_control",
     "first_length",
     "leaves",
-    "longest",
+    "longest_advance",
     "next_control",
     "next_length",
     "share_left",

@@ -68,7 +68,7 @@ from xcrack.growth.step_length import (
     PAST,
     first_control,
     leaves,
-    longest,
+    longest_advance,
     next_control,
     share_left,
     shortest_length,
@@ -133,7 +133,7 @@ def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
     """The next step of σ without regard to boundaries, and whether all tips stop growing in it."""
     solves = solves_of(step)[1]
     last_solves = solves.last(2)
-    length = longest(rule, step.control)
+    length = longest_advance(rule, step.control)
     if rule.cycles is not None:
         fastest_rate = float(solves.rate[-1].max(initial=0.0))
         factor = 1.0 if solves.n_solves == 1 else _FASTER
@@ -855,8 +855,10 @@ def _cycles(
         return growth.cycles, _CyclesError(line_error, 0.0, line_error)
     # The second step: the parabola tells what the first one, along a line, was off.
     line, curve = (span.arcs()[1] for span in spans.of_step_before[1:])
-    both = _RATIO_OF_FIRST * (line_error + share * abs(curve - line))
-    return growth.cycles + curve - line, _CyclesError(_OF_SECOND * line_error, 0.0, both)
+    line_and_curve_error = _RATIO_OF_FIRST * (line_error + share * abs(curve - line))
+    return growth.cycles + curve - line, _CyclesError(
+        _OF_SECOND * line_error, 0.0, line_and_curve_error
+    )
 
 
 def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float) -> _CyclesError:

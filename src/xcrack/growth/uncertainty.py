@@ -70,9 +70,9 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
     n = len(rate)
     total, contact, turn = np.zeros(n), np.zeros(n), np.zeros(n)
     moved_rates = _rates_of_moved_K(rule, rates, bar)
-    for mode, both in enumerate(moved_rates):
+    for mode, rates_of_mode in enumerate(moved_rates):
         change, angle_change = np.zeros(n), np.zeros(n)
-        for other_angle, other in both:
+        for other_angle, other in rates_of_mode:
             change = np.maximum(change, _log_ratio(rate, other))
             angle_change = np.maximum(angle_change, np.abs(other_angle - angle))
         share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(parts, bar)])
@@ -83,8 +83,10 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
         return RateError(np.nan, 0.0, np.nan)
     if not is_known[counts].all() or np.isinf(rate[counts]).any():
         return RateError(np.nan, 0.0, np.nan)
-    worst = int(np.argmax(np.where(counts, total, -1.0)))
-    return RateError(float(total[worst]), float(contact[worst]), float(turn[counts].max()))
+    worst_place = int(np.argmax(np.where(counts, total, -1.0)))
+    return RateError(
+        float(total[worst_place]), float(contact[worst_place]), float(turn[counts].max())
+    )
 
 
 # Bars that are foretold from those of the solve before. On a mesh that stays eta keeps its share of
@@ -154,7 +156,7 @@ def add_K_error(
         )
     else:
         error_before, cycles = last.error, corrected_step.cycles - last.cycles
-        both, parts = (
+        errors_of_K, parts = (
             [error_before.rate, rate_error_now.rate],
             [error_before.rate_contact, rate_error_now.contact],
         )
@@ -163,8 +165,8 @@ def add_K_error(
         # Of 2D tips it is known how errors of before have grown.
         drift = corrected_step.error.K_place
         K_place, share = (error_before.K_place, _ASTRAY) if np.isnan(drift) else (drift, 1.0)
-        of_K = [rate - part for rate, part in zip(both, parts) if np.isfinite(rate)]
-        of_contact = [part for rate, part in zip(both, parts) if np.isfinite(rate)]
+        of_K = [rate - part for rate, part in zip(errors_of_K, parts) if np.isfinite(rate)]
+        of_contact = [part for rate, part in zip(errors_of_K, parts) if np.isfinite(rate)]
         error = replace(
             corrected_step.error,
             K=error_before.K + TOGETHER * 0.5 * cycles * sum(of_K),
@@ -200,14 +202,14 @@ def shortfall(rule: GrowthRule, last: Step) -> str:
         "contact": error.contact / max(last.cycles, 1e-300),
         "no bar": error.unknown / max(last.cycles, 1e-300),
     }
-    worst = max(shares, key=lambda name: shares[name])
+    worst_name = max(shares, key=lambda name: shares[name])
     parts = ", ".join(f"{name} {share:.1e}" for name, share in shares.items() if share > 0)
     reasons = dict.fromkeys(r for state in last.sif for sif in state for r in sif.reasons if r)
-    reasons_in_words = f" ({'; '.join(reasons)})" if reasons and worst == "no bar" else ""
+    reasons_in_words = f" ({'; '.join(reasons)})" if reasons and worst_name == "no bar" else ""
     return (
         f"tolerance = {rule.tolerance:g} is not met at step {last.index}: the life is known to "
         f"{life:.1e}, the path to {path:.1e} of the length grown, by {parts}. "
-        f"{_REMEDY[worst]}{reasons_in_words}"
+        f"{_REMEDY[worst_name]}{reasons_in_words}"
     )
 
 
@@ -226,7 +228,7 @@ def _rates_of_moved_K(
         ]
     # Of a cycle, K of its states is all that changes: all K are asked for at once, side by side.
     inputs = criterion_inputs(rule, rates.problem, rates.response)
-    angles, others = [], []
+    angles, other_angles = [], []
     with collected_warnings([]):  # they are of cracks that nobody has
         for c, one in enumerate(inputs):
             every = [
@@ -235,9 +237,12 @@ def _rates_of_moved_K(
             each = one.rates_of_K(np.concatenate(every, axis=1))
             shape = (n_modes, len(_SIGNS), one.K.shape[1])
             angles.append(each.angle.reshape(shape))
-            others.append(each.rate.reshape(shape))
-    angle, rate = np.concatenate(angles, axis=2), np.concatenate(others, axis=2)
-    return [list(zip(*both, strict=True)) for both in zip(angle, rate, strict=True)]
+            other_angles.append(each.rate.reshape(shape))
+    angle, rate = np.concatenate(angles, axis=2), np.concatenate(other_angles, axis=2)
+    return [
+        list(zip(*angles_and_rates, strict=True))
+        for angles_and_rates in zip(angle, rate, strict=True)
+    ]
 
 
 def _moved_rates(

@@ -61,15 +61,15 @@ def _depth_ahead(x: Floats, direction: Floats, mesh: Mesh) -> float:
     Möller and Trumbore's intersection of a ray with triangles (1997, J. Graphics Tools 2, 21).
     """
     corner = mesh.points[mesh.facets[mesh.facet_to_cell[:, 1] < 0]]
-    one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    edge_normal = np.cross(direction, two)
-    volume = (one * edge_normal).sum(axis=1)
+    first_side, second_side = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    edge_normal = np.cross(direction, second_side)
+    volume = (first_side * edge_normal).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         gap = x - corner[:, 0]
         u = (gap * edge_normal).sum(axis=1) / volume
-        gap_normal = np.cross(gap, one)
+        gap_normal = np.cross(gap, first_side)
         v = gap_normal @ direction / volume
-        t = (gap_normal * two).sum(axis=1) / volume
+        t = (gap_normal * second_side).sum(axis=1) / volume
     hit = (volume != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
     return float(t[hit].min(initial=np.inf))
 
@@ -165,12 +165,12 @@ def validity(
     Zones: (K / yield)² / 2π in plane stress, a third of it in plane strain; a body in space counts
     as plane strain where its smallest extent is at least 2.5 (K / yield)².
     """
-    worst: dict[str, float] = {}
+    largest_share: dict[str, float] = {}
     places: dict[str, str] = {}
 
     def judge(key: str, value: float, place: str) -> None:
-        if value > worst.get(key, -np.inf):
-            worst[key], places[key] = value, place
+        if value > largest_share.get(key, -np.inf):
+            largest_share[key], places[key] = value, place
 
     yield_stress, state = material.yield_stress, "stress"
     nu = elasticity(mesh, material).poisson
@@ -207,12 +207,12 @@ def validity(
                 for solution in solutions:
                     load = _section(solution, places_of_crack.x[j], directions[j], obstacle.length)
                     judge("of_section", load / yield_stress, f"{place}, towards {obstacle.label}")
-    if "K" not in worst:
+    if "K" not in largest_share:
         return None
     if yield_stress is not None:
-        state = material.constraint(thickness, (worst["K"] / yield_stress) ** 2)
+        state = material.constraint(thickness, (largest_share["K"] / yield_stress) ** 2)
     keys = ("K", "zone", "of_crack", "of_ligament", "of_toughness", "of_section")
-    numbers: dict[str, Any] = {key: worst.get(key, np.nan) for key in keys}
+    numbers: dict[str, Any] = {key: largest_share.get(key, np.nan) for key in keys}
     return Validity(**numbers, state=state, places=places)
 
 

@@ -231,12 +231,12 @@ class IterativeSystem:
         if start is not None:
             y = _vectors(self.coordinates(start.reshape(columns.shape) - u_columns))
         first = independent_columns(b)
-        others = [k for k in range(len(b)) if k not in first]
+        other_columns = [k for k in range(len(b)) if k not in first]
         self._solve_apart(first, b, known_of, y, tolerance)
-        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in others])
-        for k, guess in zip(others, guesses, strict=True):
+        guesses = best_guesses(self.operator, [y[k] for k in first], [b[k] for k in other_columns])
+        for k, guess in zip(other_columns, guesses, strict=True):
             y[k] = guess
-        self._solve_apart(others, b, known_of, y, tolerance)
+        self._solve_apart(other_columns, b, known_of, y, tolerance)
         return np.asarray(u_columns + self.basis @ np.stack(y, axis=1)).reshape(f.shape)
 
     def first_look(

@@ -341,12 +341,12 @@ def read_abaqus(path: Path) -> tuple[RawMesh, list[KeywordUse]]:
     """
     model = read_model(path)
     names = dict.fromkeys(line.keyword.name for line in model.lines)
-    others = [
+    other_groups = [
         use_of(model.lines_of(name), False, OUTPUT_KEYWORDS.get(name, "it is not of the mesh"))
         for name in names
         if name not in MESH_KEYWORDS
     ]
-    return model.raw_mesh(), [*model.mesh_uses(), *others]
+    return model.raw_mesh(), [*model.mesh_uses(), *other_groups]
 
 
 def read_model(path: Path) -> AbaqusModel:

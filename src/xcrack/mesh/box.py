@@ -84,8 +84,8 @@ def box(
         turn = np.linalg.det(x[:, 1:] - x[:, :1]) < 0
     cells[turn] = cells[turn][:, [1, 0, *range(2, d + 1)]]
     sets = {}
-    for axis, both in enumerate((_SIDES[0], *_SIDES[1 : d - 1], _SIDES[-1])):
-        for name, end in zip(both, (0, count[axis]), strict=True):
+    for axis, side_names in enumerate((_SIDES[0], *_SIDES[1 : d - 1], _SIDES[-1])):
+        for name, end in zip(side_names, (0, count[axis]), strict=True):
             sets[name] = _facets_on(cells, index[axis] == end)
     return sound_mesh(points, cells, sets)
 

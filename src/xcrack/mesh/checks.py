@@ -86,17 +86,17 @@ def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
 
 def _oriented_cells(points: Floats, cells: Ints) -> Ints:
     one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
-    volume, longest = np.empty(len(cells)), np.empty(len(cells))
+    volume, longest_edge = np.empty(len(cells)), np.empty(len(cells))
     for part in row_stretches(len(cells)):
         x = points[cells[part]]
         with np.errstate(all="ignore"):  # lengths whose products are too small for a number
             volume[part] = np.linalg.det(x[:, 1:] - x[:, :1])
-        longest[part] = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
-    is_flat = np.abs(volume) <= _FLAT * longest ** points.shape[1]
+        longest_edge[part] = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
+    is_flat = np.abs(volume) <= _FLAT * longest_edge ** points.shape[1]
     if is_flat.any():
-        worst = int(np.argmax(is_flat))
+        worst_cell = int(np.argmax(is_flat))
         raise MeshError(
-            f"cell {worst} at {at(points[cells[worst]].mean(axis=0))} has no volume "
+            f"cell {worst_cell} at {at(points[cells[worst_cell]].mean(axis=0))} has no volume "
             f"({int(is_flat.sum())} such cells): remesh, or merge its points."
         )
     cells_turned = np.array(cells)

@@ -254,7 +254,7 @@ def _curved_edges(points: Floats, kind: str, data: Ints, source: str) -> _Curved
     _check_middles(middles, ends, length, data, source)
     offset = np.linalg.norm(middles - ends.mean(axis=2), axis=2)
     share = offset / np.maximum(length, np.finfo(float).tiny)
-    worst = np.unravel_index(int(np.argmax(share)), share.shape)
+    worst_edge = np.unravel_index(int(np.argmax(share)), share.shape)
     pairs = data[:, np.array(shape.edges)]
     faces = [face for face in shape.faces if len(face) == 4]
     if faces:
@@ -264,13 +264,15 @@ def _curved_edges(points: Floats, kind: str, data: Ints, source: str) -> _Curved
         centre = middles[:, edges_around].sum(axis=2) / 2 - x[corner].sum(axis=2) / 4
         pairs = np.concatenate([pairs, corner[:, :, [0, 2]], corner[:, :, [1, 3]]], axis=1)
         middles = np.concatenate([middles, centre, centre], axis=1)
-        both = x[pairs]
-        offset = np.linalg.norm(middles - both.mean(axis=2), axis=2)
-        share = offset / np.maximum(np.linalg.norm(both[:, :, 1] - both[:, :, 0], axis=2), 1e-300)
+        edge_ends = x[pairs]
+        offset = np.linalg.norm(middles - edge_ends.mean(axis=2), axis=2)
+        share = offset / np.maximum(
+            np.linalg.norm(edge_ends[:, :, 1] - edge_ends[:, :, 0], axis=2), 1e-300
+        )
     is_curved = share > _STRAIGHT
     listed_pairs = np.sort(pairs[is_curved], axis=1).astype(np.int64)
     listed_pairs, first = np.unique(listed_pairs, axis=0, return_index=True)
-    largest = (float(share[worst]), float(offset[worst])) if count else (0.0, 0.0)
+    largest = (float(share[worst_edge]), float(offset[worst_edge])) if count else (0.0, 0.0)
     return listed_pairs, middles[is_curved][first], largest
 
 
@@ -447,8 +449,8 @@ def _triangles(points: Floats, rows: Ints, plane: bool, source: str) -> tuple[In
 def _worst_shape(points: Floats, triangles: Ints, keep: Bools) -> Floats:
     """Least area over squared edges of the triangles of each cell; negative where they fold."""
     x = points[triangles][..., :2]
-    one, two = x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]
-    area = one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
+    first_side, second_side = x[:, :, 1] - x[:, :, 0], x[:, :, 2] - x[:, :, 0]
+    area = first_side[..., 0] * second_side[..., 1] - first_side[..., 1] * second_side[..., 0]
     edges = x - np.roll(x, 1, axis=2)
     square = np.maximum((edges**2).sum(axis=(2, 3)), np.finfo(float).tiny)
     shape = np.where(keep, area / square, np.nan)

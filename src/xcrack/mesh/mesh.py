@@ -142,10 +142,10 @@ class Mesh:
     @cached_property
     def longest_edge(self) -> Floats:
         """Length of the longest edge at each point `(n,)`."""
-        longest = np.zeros(self.n_points)
+        edge_length = np.zeros(self.n_points)
         for end in (0, 1):
-            np.maximum.at(longest, self.edges[:, end], self.edge_length)
-        return lock(longest)
+            np.maximum.at(edge_length, self.edges[:, end], self.edge_length)
+        return lock(edge_length)
 
     @cached_property
     def corners_and_edges(self) -> Ints:
@@ -193,8 +193,8 @@ class Mesh:
         number[order] = np.cumsum(is_begin) - 1
         cells_of = np.full((len(first), 2), -1, dtype=np.int64)
         cells_of[:, 0] = first // (d + 1)
-        two = counts == 2
-        cells_of[two, 1] = order[begin[two] + 1] // (d + 1)
+        is_inner = counts == 2
+        cells_of[is_inner, 1] = order[begin[is_inner] + 1] // (d + 1)
         return lock(facet_corners), lock(cells_of), lock(key)
 
     @cached_property
@@ -519,11 +519,11 @@ def nearest_nodes(mesh: Mesh, x: Floats, what: str) -> Ints:
         raise ProblemError(f"{what}: the points need {mesh.dim} coordinates, not {x.shape[1]}.")
     places = np.concatenate([mesh.points, mesh.edge_middles])
     distance, number = cKDTree(places).query(x)
-    worst = int(np.argmax(distance))
-    if distance[worst] > mesh.cell_size.max():
+    worst_point = int(np.argmax(distance))
+    if distance[worst_point] > mesh.cell_size.max():
         raise ProblemError(
-            f"{what}: {x[worst].tolist()} is {distance[worst]:.4g} away from the nearest mesh "
-            f"point {places[number[worst]].tolist()}: give points of the body."
+            f"{what}: {x[worst_point].tolist()} is {distance[worst_point]:.4g} away from the "
+            f"nearest mesh point {places[number[worst_point]].tolist()}: give points of the body."
         )
     return np.asarray(number, dtype=np.int64)
 

@@ -38,9 +38,9 @@ def ear_clipped(polygon: Floats) -> Ints:
             is_within &= (np.abs(remaining_polygon[:, None] - [a, b, c]).max(axis=2) > 0).all(
                 axis=1
             )
-            longest = max(np.sum((b - a) ** 2), np.sum((c - b) ** 2), np.sum((a - c) ** 2))
-            if not is_within.any() and area[k] / longest > best:
-                best, where = float(area[k] / longest), int(k)
+            longest_square = max(np.sum((b - a) ** 2), np.sum((c - b) ** 2), np.sum((a - c) ** 2))
+            if not is_within.any() and area[k] / longest_square > best:
+                best, where = float(area[k] / longest_square), int(k)
         if where < 0:
             # Only points on one line are left over at this end; they hold no area.
             where = int(np.argmin(np.abs(area)))

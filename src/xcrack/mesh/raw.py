@@ -250,8 +250,8 @@ def _unique_rows(rows: Ints) -> Ints:
 
 def _row_numbers(rows: Ints, sought_rows: Ints) -> Ints:
     """Numbers of the rows that have the points asked for, each once."""
-    both = np.sort(np.concatenate([rows, sought_rows]), axis=1)
-    inverse = np.unique(both, axis=0, return_inverse=True)[1].ravel()
+    all_rows = np.sort(np.concatenate([rows, sought_rows]), axis=1)
+    inverse = np.unique(all_rows, axis=0, return_inverse=True)[1].ravel()
     place = np.full(int(inverse.max()) + 1, -1, dtype=np.int64)
     place[inverse[: len(rows)]] = np.arange(len(rows))
     return np.unique(place[inverse[len(rows) :]])

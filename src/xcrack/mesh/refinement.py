@@ -83,8 +83,10 @@ def simplices(mesh: Mesh) -> Simplices:
 def moved_simplices(simplex_set: Simplices, points: Floats) -> Simplices:
     """The same simplices with their points at other places."""
     middle, rank = _ranked_edges(points, simplex_set.edges)
-    longest = _longest_edges(middle, rank, simplex_set.cell_to_edge)
-    return replace(simplex_set, points=points, edge_middles=middle, rank=rank, longest_edge=longest)
+    longest_edge = _longest_edges(middle, rank, simplex_set.cell_to_edge)
+    return replace(
+        simplex_set, points=points, edge_middles=middle, rank=rank, longest_edge=longest_edge
+    )
 
 
 def bisect_simplices(simplex_set: Simplices, is_marked: Bools) -> tuple[Simplices, Bools]:
@@ -194,10 +196,12 @@ def _with_edges(simplex_set: Simplices, edges: Ints) -> Simplices:
 def _edges_across(simplex_set: Simplices, rows: Bools, point: Ints) -> Ints:
     """Edges from the middle of each cell's longest edge to its other points `(k, d - 1, 2)`."""
     dim = simplex_set.cells.shape[1] - 1
-    others = np.array([[k for k in range(dim + 1) if k not in pair] for pair in local_edges(dim)])
-    longest, cells = simplex_set.longest_edge[rows], simplex_set.cells[rows]
-    middle = point[_row(simplex_set.cell_to_edge[rows], longest)]
-    other = np.take_along_axis(cells, others[longest], axis=1)
+    other_corners = np.array(
+        [[k for k in range(dim + 1) if k not in pair] for pair in local_edges(dim)]
+    )
+    longest_edge, cells = simplex_set.longest_edge[rows], simplex_set.cells[rows]
+    middle = point[_row(simplex_set.cell_to_edge[rows], longest_edge)]
+    other = np.take_along_axis(cells, other_corners[longest_edge], axis=1)
     return np.stack([other, np.broadcast_to(middle[:, None], other.shape)], axis=-1)
 
 
@@ -209,33 +213,35 @@ def _halved_cells(
     pairs = local_edges(dim)
     pair_of = np.zeros((dim + 1, dim + 1), dtype=np.int64)
     pair_of[pairs[:, 0], pairs[:, 1]] = pair_of[pairs[:, 1], pairs[:, 0]] = np.arange(len(pairs))
-    others = np.array([[k for k in range(dim + 1) if k not in pair] for pair in pairs])
-    cells, longest, facet = (
+    other_corners = np.array([[k for k in range(dim + 1) if k not in pair] for pair in pairs])
+    cells, longest_edge, facet = (
         simplex_set.cells[rows],
         simplex_set.longest_edge[rows],
         simplex_set.facet[rows],
     )
     edges = simplex_set.cell_to_edge[rows]
     n = np.arange(len(cells))
-    top = edges[n, longest]
+    top = edges[n, longest_edge]
     children = []
     for side in (0, 1):
-        corner_retained, corner_moved = pairs[longest, side], pairs[longest, 1 - side]
+        corner_retained, corner_moved = pairs[longest_edge, side], pairs[longest_edge, 1 - side]
         corners, sides, outer_facets = cells.copy(), edges.copy(), facet.copy()
         corners[n, corner_moved] = point[top]
-        sides[n, longest] = half[top] + (simplex_set.edges[top, 0] != cells[n, corner_retained])
-        for k, edge in zip(others[longest].T, edges_across.T, strict=True):
+        sides[n, longest_edge] = half[top] + (
+            simplex_set.edges[top, 0] != cells[n, corner_retained]
+        )
+        for k, edge in zip(other_corners[longest_edge].T, edges_across.T, strict=True):
             sides[n, pair_of[corner_moved, k]] = edge
         outer_facets[n, corner_retained] = -1
         children.append((corners, sides, outer_facets))
     corners, sides, outer_facets = (np.concatenate(parts) for parts in zip(*children, strict=True))
     is_unsplit = ~rows
-    longest = _longest_edges(simplex_set.edge_middles, simplex_set.rank, sides)
+    longest_edge = _longest_edges(simplex_set.edge_middles, simplex_set.rank, sides)
     return replace(
         simplex_set,
         cells=np.concatenate([simplex_set.cells[is_unsplit], corners]),
         cell_to_edge=np.concatenate([simplex_set.cell_to_edge[is_unsplit], sides]),
-        longest_edge=np.concatenate([simplex_set.longest_edge[is_unsplit], longest]),
+        longest_edge=np.concatenate([simplex_set.longest_edge[is_unsplit], longest_edge]),
         facet=np.concatenate([simplex_set.facet[is_unsplit], outer_facets]),
         parent=np.concatenate(
             [simplex_set.parent[is_unsplit], np.tile(simplex_set.parent[rows], 2)]
@@ -376,9 +382,11 @@ def with_room(places: Sequence[Floats], sizes: Sequence[Floats]) -> list[Floats]
     """Sizes at the places of each crack, less where those of another one are close."""
     result = []
     for c, (x, size) in enumerate(zip(places, sizes, strict=True)):
-        others = np.concatenate([np.zeros((0, 3)), *places[:c], *places[c + 1 :]])
+        other_places = np.concatenate([np.zeros((0, 3)), *places[:c], *places[c + 1 :]])
         distance = (
-            cKDTree(others).query(x)[0] if len(others) and len(x) else np.full(len(x), np.inf)
+            cKDTree(other_places).query(x)[0]
+            if len(other_places) and len(x)
+            else np.full(len(x), np.inf)
         )
         result.append(np.minimum(size, np.maximum(distance / _ROOM, _CLOSEST * size)))
     return result

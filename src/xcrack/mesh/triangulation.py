@@ -89,8 +89,8 @@ def _parted_at_points(faces: Ints) -> tuple[Ints, Ints]:
         neighbours = np.stack([faces[faces_around, (corner + k) % 3] for k in (1, 2)], axis=1)
         part = np.unique(neighbours, return_inverse=True)[1].reshape(-1, 2)
         for _ in range(len(faces_around)):
-            np.minimum.at(smallest := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
-            part = smallest[part]
+            np.minimum.at(lowest_part := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
+            part = lowest_part[part]
         for other in np.unique(part[:, 0])[1:]:
             is_of_part = part[:, 0] == other
             parted_faces[faces_around[is_of_part], corner[is_of_part]] = len(original_numbers)
@@ -179,8 +179,8 @@ def split_sides(points: Floats, faces: Ints, is_marked: Bools) -> tuple[Floats, 
     pairs = np.zeros((len(key), 2), dtype=np.int64)
     pairs[inverse.ravel()] = np.sort(sides(faces), axis=2).reshape(-1, 2)
     length = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
-    longest = np.argmax(length[inverse] * (1 - 1e-12 * np.arange(3)), axis=1)
-    longest_side = inverse[np.arange(len(faces)), longest]
+    number_of_longest = np.argmax(length[inverse] * (1 - 1e-12 * np.arange(3)), axis=1)
+    longest_side = inverse[np.arange(len(faces)), number_of_longest]
     cut = np.zeros(len(key), dtype=bool)
     cut[inverse[is_marked]] = True
     while True:
@@ -192,7 +192,7 @@ def split_sides(points: Floats, faces: Ints, is_marked: Bools) -> tuple[Floats, 
     number[cut] = len(points) + np.arange(int(cut.sum()))
     middle = (points[pairs[cut, 0]] + points[pairs[cut, 1]]) / 2
     # Turned so that the longest side is the first one of every face.
-    column = (longest[:, None] + np.arange(3)) % 3
+    column = (number_of_longest[:, None] + np.arange(3)) % 3
     corner = np.take_along_axis(faces, column, axis=1)
     centre = number[np.take_along_axis(inverse, column, axis=1)]
     (a, b, c), (ab, bc, ca) = corner.T, centre.T

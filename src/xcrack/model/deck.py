@@ -632,7 +632,7 @@ def _uses(state: DeckState, left_out: set[str]) -> list[KeywordUse]:
         lines = model.lines_of(name)
         current_lines = [line for line in lines if state.counts(line)]
         is_frame = name in ("STEP", "END STEP", "STATIC")
-        others = [] if is_frame else [line for line in lines if not state.counts(line)]
+        other_lines = [] if is_frame else [line for line in lines if not state.counts(line)]
         if name in MESH_KEYWORDS:
             continue
         if name in left_out:
@@ -649,10 +649,10 @@ def _uses(state: DeckState, left_out: set[str]) -> list[KeywordUse]:
                 uses.append(
                     use_of(lines if is_frame else current_lines, True, known_keywords.get(name, ""))
                 )
-            if others:
-                place = others[0].keyword.place
+            if other_lines:
+                place = other_lines[0].keyword.place
                 reason = "it is of another step"
-                uses.append(KeywordUse(f"*{name}", len(others), place, False, reason, True))
+                uses.append(KeywordUse(f"*{name}", len(other_lines), place, False, reason, True))
         elif name in _HARMLESS or name.endswith(" OUTPUT"):
             reason = _HARMLESS.get(name, "what another program writes")
             place = lines[0].keyword.place

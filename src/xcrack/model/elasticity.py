@@ -436,9 +436,9 @@ def _set_numbers(mesh: Mesh, names: list[str]) -> Ints:
     number = np.full(len(mesh.cells), -1)
     for k, name in enumerate(names):
         if name not in mesh.cell_sets:
-            others = ", ".join(map(repr, mesh.cell_sets)) or "none"
+            other_names = ", ".join(map(repr, mesh.cell_sets)) or "none"
             raise ProblemError(
-                f"material: the mesh has no cell set {value_text(name)}: it has {others}."
+                f"material: the mesh has no cell set {value_text(name)}: it has {other_names}."
             )
         members = mesh.cell_sets[name]
         if not len(members):

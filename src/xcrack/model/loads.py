@@ -534,8 +534,8 @@ class line_force(Load):  # noqa: N801
             facets = np.sort(facet_set(mesh, name, self.kind), axis=1)
             corners = combinations(range(mesh.dim), mesh.dim - 1)
             sides.append(np.unique(np.concatenate([facets[:, c] for c in corners]), axis=0))
-        both, count = np.unique(np.concatenate(sides), axis=0, return_counts=True)
-        edges = both[count == 2]
+        edges_of_sides, count = np.unique(np.concatenate(sides), axis=0, return_counts=True)
+        edges = edges_of_sides[count == 2]
         if not len(edges):
             raise ProblemError(
                 f"{self.name}: the sets {self.where!r} and {self.beside!r} have no edge in common: "

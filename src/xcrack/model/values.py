@@ -145,8 +145,8 @@ def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) ->
         ]
         return np.stack(columns, axis=1)
     if callable(value):
-        two = normal is not None and _n_positional(value) >= 2
-        arguments = (x, normal) if two else (x,)
+        takes_normal = normal is not None and _n_positional(value) >= 2
+        arguments = (x, normal) if takes_normal else (x,)
         result = _real_values(call_function(value, f"the value of {what}", *arguments), what)
     else:
         result = numbers(value, what)

@@ -73,8 +73,8 @@ def piece_cells(space: FunctionSpace) -> PieceCells:
     if plane:
         is_near = _near_tip(space, mesh.points[mesh.edges])
         is_touched = is_touched | is_near[mesh.cell_to_edge].any(axis=1)
-    plain_cells, others = np.nonzero(~is_touched)[0], np.nonzero(is_touched)[0]
-    subs = sub_cells(space, others)
+    plain_cells, touched_cells = np.nonzero(~is_touched)[0], np.nonzero(is_touched)[0]
+    subs = sub_cells(space, touched_cells)
     cell, bary, side = (
         _without_exits(space, subs) if plane else (subs.cell, subs.bary.copy(), subs.side.copy())
     )

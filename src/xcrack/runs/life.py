@@ -386,7 +386,7 @@ def _of_levels(history: History, lead: DrivingForce, law: Law, block: SpectrumBl
 
 def _of_tips(rows: DrivingForce, law: Law, scatter: Scatter) -> float:
     """Largest change of shares of the advance, of the 5 and 95 % samples of each source alone."""
-    cycles, worst = rows.cycles[rows.step[rows.is_driving]], 0.0
+    cycles, largest_bound = rows.cycles[rows.step[rows.is_driving]], 0.0
     for name, part in scatter.parts.items():
         if name in ("C", "a0"):
             continue
@@ -397,14 +397,14 @@ def _of_tips(rows: DrivingForce, law: Law, scatter: Scatter) -> float:
                 if is_own_constant
                 else rows.rates(law, value)
             )
-            worst = max(worst, bound_of_shares(rows, rate[:, 0], cycles))
-    if worst > _MOST:
+            largest_bound = max(largest_bound, bound_of_shares(rows, rate[:, 0], cycles))
+    if largest_bound > _MOST:
         raise ProblemError(
             f"life: some samples would have shared the advance of the tips another way, by "
-            f"{worst:.1%} in the mean (more than {_MOST:.0%}): the path would differ. Run them as "
-            "cases of a campaign."
+            f"{largest_bound:.1%} in the mean (more than {_MOST:.0%}): the path would differ. "
+            "Run them as cases of a campaign."
         )
-    return worst
+    return largest_bound
 
 
 __all__ = ["Life", "life"]

@@ -553,7 +553,7 @@ def bound_of_shares(rows: DrivingForce, new_rates: Floats, new_cycles: Floats) -
         Cycles by them of the steps that are reached.
     """
     old_rates, first = rows.rate[:, 0], np.unique(rows.step)
-    worst = np.zeros(len(new_cycles))
+    largest_bound = np.zeros(len(new_cycles))
     for n, step in enumerate(first[: len(new_cycles)].tolist()):
         is_of_step = rows.step == step
         lead = is_of_step & rows.is_driving
@@ -563,11 +563,11 @@ def bound_of_shares(rows: DrivingForce, new_rates: Floats, new_cycles: Floats) -
                 / (new_rates[lead] / old_rates[lead])
                 - 1
             )
-        worst[n] = np.nan_to_num(
+        largest_bound[n] = np.nan_to_num(
             change * rows.da[is_of_step] / rows.da[lead], nan=0.0, posinf=1.0
         ).max()
     total = new_cycles.sum()
-    return float(worst @ new_cycles / total) if total else 0.0
+    return float(largest_bound @ new_cycles / total) if total else 0.0
 
 
 __all__ = [

@@ -263,8 +263,10 @@ def _ends(
             K = np.stack([K[0], np.zeros_like(K[0]), K[1]])
         ladder = LevelTable(levels, K, is_smooth=len(levels) > 3)
         angle = step.angle[crack][place]
-        both = [equivalent_K(clipped_K(ladder.at(values[:, k])), angle, nu)[:, 0] for k in (0, 1)]
-        result.append(np.stack([np.minimum(*both), np.maximum(*both)], axis=1))
+        K_at_ends = [
+            equivalent_K(clipped_K(ladder.at(values[:, k])), angle, nu)[:, 0] for k in (0, 1)
+        ]
+        result.append(np.stack([np.minimum(*K_at_ends), np.maximum(*K_at_ends)], axis=1))
     return np.stack(result)
 
 

@@ -409,11 +409,11 @@ class _Tabulated:
         node = np.clip(at.astype(np.int64), 0, len(self.nodes) - 2)
         share = (at - node)[:, None, None]
         low, high = self.table[node], self.table[node + 1]
-        both = (low > 0) & np.isfinite(high) & (high > 0)
+        has_rates = (low > 0) & np.isfinite(high) & (high > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             power = low * (high / low) ** share
             line = np.where(np.isinf(high), np.where(share > 0, np.inf, low), low + share * high)
-        return np.asarray(np.where(both, power, line))
+        return np.asarray(np.where(has_rates, power, line))
 
 
 def _cycles_by_rates(lead: DrivingForce, rate: Floats, size: Floats | None) -> Floats:

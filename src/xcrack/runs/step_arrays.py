@@ -54,14 +54,14 @@ def pack(prefix: str, value: Any, leave_out: Sequence[str] = ()) -> Arrays:
     return result
 
 
-def unpack(kind: type[Value], prefix: str, arrays: Arrays, **others: Any) -> Value | None:
-    """What `pack` made arrays of; None where it had none. `others` are fields left out there."""
+def unpack(kind: type[Value], prefix: str, arrays: Arrays, **other_fields: Any) -> Value | None:
+    """What `pack` made arrays of; None where it had none. `other_fields` were left out there."""
     if not any(name.startswith(f"{prefix}_") for name in arrays):
         return None
-    hints, values = get_type_hints(kind), dict(others)
+    hints, values = get_type_hints(kind), dict(other_fields)
     for field in fields(kind):  # type: ignore[arg-type]
         name, hint = f"{prefix}_{field.name}", _without_none(hints[field.name])
-        if field.name in others:
+        if field.name in other_fields:
             continue
         if is_dataclass(hint):
             values[field.name] = unpack(hint, name, arrays)  # type: ignore[arg-type]

@@ -73,9 +73,9 @@ def state_names(steps: Sequence[Step]) -> list[str]:
     every = {name for step in steps for name in step.states}
     numbers = sorted((name for name in every if name.isdigit()), key=int)
     words = [name for step in steps for name in step.states if not name.isdigit()]
-    others = [name for name in dict.fromkeys(words) if name not in ("min", "max")]
+    other_names = [name for name in dict.fromkeys(words) if name not in ("min", "max")]
     ends = [[name] if name in every else [] for name in ("min", "max")]
-    return [*ends[0], *numbers, *others, *ends[1]]
+    return [*ends[0], *numbers, *other_names, *ends[1]]
 
 
 def _K_of_states(step: Step, states: Sequence[str], c: int, modes: int) -> list[Floats]:

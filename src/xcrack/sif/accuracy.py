@@ -175,20 +175,20 @@ def warn_of(
         for message in messages:
             warn(message)
         return
-    worst, text = _OFF, ""
+    largest_error, text = _OFF, ""
     for solution, part in zip(solutions, parts, strict=True):
         error_of_K = np.abs(part.eta) + part.bar
         error_of_K[part.closed, 0] = 0.0  # K_I is exact there
         largest = float(np.abs(part.K).max(initial=0.0))
         scale = max(largest, _NOTHING * _K_of_mean_stress(solution, part, radius))
-        if not error_of_K.size or error_of_K.max() <= worst * scale:
+        if not error_of_K.size or error_of_K.max() <= largest_error * scale:
             continue
-        worst = float(error_of_K.max()) / scale
+        largest_error = float(error_of_K.max()) / scale
         row, mode = np.unravel_index(error_of_K.argmax(), error_of_K.shape)
         text = (
             f"K at {at(part.x[row])}: {('K_I', 'K_II')[mode]} = {part.K[row, mode]:.4g} is off by "
             f"{part.eta[row, mode]:.2g} ± {part.bar[row, mode]:.2g} by its estimate, up to "
-            f"{100 * worst:.2g} % of the largest K of the crack. Refine the mesh there"
+            f"{100 * largest_error:.2g} % of the largest K of the crack. Refine the mesh there"
         )
     if text:
         warn(". ".join([text, *(message.rstrip(".") for message in messages)]) + ".")
@@ -268,36 +268,36 @@ def _difference(
     domain: Domain, parts: Sequence[SIF], scales: Sequence[float]
 ) -> tuple[str, Floats]:
     """By how much two domains differ where that is too much, and the place."""
-    worst, text, place = domain.differ, "", domain.narrow_place
+    largest_difference, text, place = domain.differ, "", domain.narrow_place
     for part, scale in zip(parts, scales, strict=True):
         spread = np.array(part.spread)
         spread[part.closed, 0] = 0.0  # K_I is exact there
         inner = ~part.at_surface if not part.at_surface.all() else part.at_surface
         difference = float(spread[inner].mean(axis=0).max())
-        if scale > 0 and difference / scale > worst:
-            worst = difference / scale
+        if scale > 0 and difference / scale > largest_difference:
+            largest_difference = difference / scale
             place = part.x[inner][np.argmax(spread[inner].max(axis=1))]
             text = (
                 f"domains of radius {domain.outer_radius:.4g} and less differ by {difference:.3g}, "
-                f"{100 * worst:.2g} % of the largest K"
+                f"{100 * largest_difference:.2g} % of the largest K"
             )
     return text, place
 
 
 def _steep_K(domain: Domain, parts: Sequence[SIF], scales: Sequence[float]) -> str:
     """What to say of a front whose K changes from hat to hat; empty if it does not."""
-    worst, text = _WIDE, ""
+    largest_change, text = _WIDE, ""
     for part, scale in zip(parts, scales, strict=True):
         if part.widened is None or part.at_surface.all() or scale <= 0:
             continue
         change = np.array(part.widened) / scale
         change[part.closed, 0] = change[part.at_surface] = 0.0
-        if change.max() > worst:
-            worst = float(change.max())
+        if change.max() > largest_change:
+            largest_change = float(change.max())
             text = (
                 f"{domain.at(part.x[change.max(axis=1).argmax()])}: K changes from cell to cell, "
-                f"and hats twice as wide make {100 * worst:.2g} % of the largest K of it. Refine "
-                "the mesh there."
+                f"and hats twice as wide make {100 * largest_change:.2g} % of the largest K of it. "
+                "Refine the mesh there."
             )
     return text
 

@@ -109,9 +109,11 @@ def _ring_part(
 ) -> RingPart:
     """Cells of the material at the tip, for which q is not smooth at circles, or of another one."""
     is_plain = space.signature[cells] == 0
-    others = cells[~is_plain]
-    points = (tabulate_functions(space, p) for p in class_points(space, others, n, degree, circles))
-    is_one_chunk = len(others) <= _CHUNK
+    other_cells = cells[~is_plain]
+    points = (
+        tabulate_functions(space, p) for p in class_points(space, other_cells, n, degree, circles)
+    )
+    is_one_chunk = len(other_cells) <= _CHUNK
     return RingPart(
         cells[is_plain], degree, tuple(points) if is_one_chunk else points, circles is None
     )
@@ -196,7 +198,7 @@ def _largest_difference(
     solutions: Sequence[Solution], ends: Sequence[int], tips: Sequence[tuple[list[SIF], Domain]]
 ) -> float:
     """Largest difference of K of the domains and of the lips, over the largest K of the crack."""
-    worst = 0.0
+    largest_share = 0.0
     for n, solution in enumerate(solutions):
         jump = solution.jump(solution.space.tips[ends[0]].crack)
         scale, difference = 0.0, 0.0
@@ -208,8 +210,8 @@ def _largest_difference(
             deviation = np.abs(at_lips - K)
             deviation[0] = 0.0 if part.closed[0] else deviation[0]  # K_I is exact there
             difference = max(difference, float(deviation.max()))
-        worst = max(worst, difference / scale if scale > 0 else 0.0)
-    return worst
+        largest_share = max(largest_share, difference / scale if scale > 0 else 0.0)
+    return largest_share
 
 
 def _K_of_lips(solution: Solution, t: int, jump: Floats, size: float) -> Floats:
@@ -308,17 +310,17 @@ def domain_of(solution: Solution, t: int) -> Domain:
     radius = solution.problem.numerics.domain or max(_OUTER[space.order] * tip.radius, 4.0 * size)
     free_distance, _ = nearest_boundary(space.mesh, tip.x)
     radii_of_tip: list[float] = []
-    others: list[float] = []
+    other_reaches: list[float] = []
     for other in space.tips:
         if other is not tip:
             distance = float(np.linalg.norm(other.x - tip.x))
-            (radii_of_tip if other.crack == tip.crack else others).append(distance)
+            (radii_of_tip if other.crack == tip.crack else other_reaches).append(distance)
     lips = [
         float(np.linalg.norm(points.x - tip.x, axis=1).min())
         for c, points in enumerate(solution.lips)
         if c != tip.crack and len(points)
     ]
-    room = min([0.95 * free_distance, *[0.8 * d for d in others], *[0.9 * d for d in lips]])
+    room = min([0.95 * free_distance, *[0.8 * d for d in other_reaches], *[0.9 * d for d in lips]])
     limit = min([room, *[0.8 * d for d in radii_of_tip]])
     least_length = _SHORT_OPEN if radii_of_tip else 0.0
     if solution.contact[tip.crack] is not None:

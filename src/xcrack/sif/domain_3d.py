@@ -206,12 +206,12 @@ def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool
     tip = space.tips[t]
     radius = _wanted_radius(solution, t)
     x, frame, _ = curve.at(np.array([0.0, curve.length]))
-    others = [
+    other_ends = [
         np.array(one.x) for one in space.tips if one.crack == tip.crack and one.number != tip.number
     ]
     result = []
     for e, sign in ((0, -1.0), (1, 1.0)):
-        ways = np.concatenate([*others, x[[1 - e]]]) - x[e]
+        ways = np.concatenate([*other_ends, x[[1 - e]]]) - x[e]
         distance = np.linalg.norm(ways, axis=1)
         distance_ahead = sign * (ways @ frame[e, 2])
         is_close = (distance < _BESIDE * radius) & (distance_ahead >= _AHEAD * distance)
@@ -530,12 +530,12 @@ def _lip_part(
     gradient = None
     if is_bent:
         coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
-        both = [
+        parts_of_sides = [
             gradients_at(space, coefficients, *_on_lip(solutions[0], c, near_points, s, sign))
             - turn
             for s, sign in ((0, -1), (1, 1))
         ]
-        gradient = np.stack(both)
+        gradient = np.stack(parts_of_sides)
     normal, weight = lips.normal[near_points], lips.weight[near_points]
     total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
     initial_stress = initial_stresses(solutions)

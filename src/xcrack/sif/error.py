@@ -514,8 +514,8 @@ def _short_parts(solution: Solution, crack: int) -> list[tuple[Floats, float, fl
             continue
         lines = [problem.placed[c] for c in (j.crack, j.on)]
         ends = [line.points[i] for line in lines for i in line.tips or ()]
-        others = [k.x for k in junctions if {k.crack, k.on} & {j.crack, j.on}]
-        distance = np.linalg.norm(np.array([*ends, *others]) - j.x, axis=1)
+        other_places = [k.x for k in junctions if {k.crack, k.on} & {j.crack, j.on}]
+        distance = np.linalg.norm(np.array([*ends, *other_places]) - j.x, axis=1)
         size = float(cell_sizes(mesh, j.x[None])[0])
         room = min([_room(mesh, j.x), *distance[distance > _SAME * size]])
         parts.append((j.x, float(room), _BRANCH, size))
@@ -574,8 +574,8 @@ def front_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -
     if reason_missing is not None:
         return reason_missing
     if solutions[0].space.order == 2:
-        widened = _WIDENED_OF_ARM if solutions[0].space.cracks[crack].ends_on else _WIDENED
-        return [_of_spread(sif, widened) for sif in sifs]
+        widening = _WIDENED_OF_ARM if solutions[0].space.cracks[crack].ends_on else _WIDENED
+        return [_of_spread(sif, widening) for sif in sifs]
     finer_solutions = solve_states(
         replace(solutions[0].problem, order=2), [s.state for s in solutions]
     )
@@ -640,12 +640,12 @@ def _of_spread(sif: SIF, share: float) -> KErrors:
 
 def _half_of_spread(sif: SIF, share: float = _WIDENED) -> Floats:
     """Half-width by two domains and by hats twice as wide, as root mean square along the front."""
-    widened = np.zeros_like(sif.K) if sif.widened is None else np.array(sif.widened)
+    widening = np.zeros_like(sif.K) if sif.widened is None else np.array(sif.widened)
     spread = np.array(sif.spread)
-    spread[sif.closed, 0] = widened[sif.closed, 0] = 0.0
+    spread[sif.closed, 0] = widening[sif.closed, 0] = 0.0
     parts = [
-        _SPREAD_OF_FRONT * spread, share * widened,
-        _SPREAD_ALONG * _mean(sif, spread), _WIDENED_ALONG * _mean(sif, widened),
+        _SPREAD_OF_FRONT * spread, share * widening,
+        _SPREAD_ALONG * _mean(sif, spread), _WIDENED_ALONG * _mean(sif, widening),
     ]  # fmt: skip
     return np.asarray(np.sqrt(np.sum(np.square(parts), axis=0)))
 

@@ -128,8 +128,8 @@ def bars_by_finer_cells(
 
 def _half_widths_of_change(change: Floats) -> Floats:
     """The change of K to the second solution, at least a share of the largest of the crack."""
-    both = np.linalg.norm(change, axis=1, keepdims=True)
-    return np.asarray(np.maximum(np.abs(change), _LEAST * both.max(initial=0.0)))
+    change_size = np.linalg.norm(change, axis=1, keepdims=True)
+    return np.asarray(np.maximum(np.abs(change), _LEAST * change_size.max(initial=0.0)))
 
 
 def _half_widths_of_friction(second: SIF, change: Floats, cells: Floats) -> Floats:
@@ -151,13 +151,13 @@ def _from_second(sif: SIF, second: SIF, of_second: KErrors, cells: Floats | None
     best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
     eta = best - sif.K
     eta[sif.closed, 0] = 0.0  # K_I of closed tips is zero
-    both = np.linalg.norm(eta, axis=1, keepdims=True)
+    eta_size = np.linalg.norm(eta, axis=1, keepdims=True)
     half = (
         _half_widths_of_change(eta)
         if cells is None
         else _half_widths_of_friction(second, eta, cells)
     )
-    bar_of_second = np.hypot(of_second.bar, _ADDED * both)
+    bar_of_second = np.hypot(of_second.bar, _ADDED * eta_size)
     bar = np.where(is_known[:, None], bar_of_second, half)
     K_if_open = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
     bar[sif.closed, 0] = K_if_open[sif.closed]

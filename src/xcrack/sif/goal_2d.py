@@ -175,8 +175,8 @@ def on_faces(solution: Solution, tips: Sequence[int], lips: LipPoints) -> tuple[
     values : (2, q, 2, 2 tips) array
     gradients : (2, q, 2, 2, 2 tips) array
     """
-    both = [_singular_part(solution, t, lips) for t in tips]
-    values, gradients = zip(*both, strict=True)
+    singular_parts = [_singular_part(solution, t, lips) for t in tips]
+    values, gradients = zip(*singular_parts, strict=True)
     return np.concatenate(values, axis=-1), np.concatenate(gradients, axis=-1)
 
 

@@ -150,8 +150,11 @@ class Bimaterial:
     @property
     def a(self) -> tuple[float, float]:
         """a_1 and a_2, 1 / stress."""
-        one, two = self.materials
-        return one.kolosov / one.mu + 1 / two.mu, two.kolosov / two.mu + 1 / one.mu
+        above_tip, below_tip = self.materials
+        return (
+            above_tip.kolosov / above_tip.mu + 1 / below_tip.mu,
+            below_tip.kolosov / below_tip.mu + 1 / above_tip.mu,
+        )
 
     @property
     def epsilon(self) -> float:
@@ -161,8 +164,8 @@ class Bimaterial:
     @property
     def modulus(self) -> float:
         """E* cosh²(pi epsilon), stress: G is |K|² over it."""
-        one, two = self.materials
-        E_mean = 2 / (1 / one.E_prime + 1 / two.E_prime)
+        material_above, material_below = self.materials
+        E_mean = 2 / (1 / material_above.E_prime + 1 / material_below.E_prime)
         return float(E_mean * np.cosh(np.pi * self.epsilon) ** 2)
 
     def unit_fields(

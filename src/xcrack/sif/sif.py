@@ -325,10 +325,10 @@ class SIF:
             return ""
         if self.K.shape[1] == 3:
             is_finite = np.isfinite(self.bar).all(axis=1)
-            longest = self.bar[is_finite].max(
+            longest_bars = self.bar[is_finite].max(
                 axis=0, initial=np.nan if not is_finite.any() else 0.0
             )
-            return f"; bars of the best up to {', '.join(f'{b:.2g}' for b in longest)}"
+            return f"; bars of the best up to {', '.join(f'{b:.2g}' for b in longest_bars)}"
         rows = [
             reason or ", ".join(f"{k:.6g} ± {b:.2g}" for k, b in zip(best, bar, strict=True))
             for best, bar, reason in zip(self.best, self.bar, self.reasons, strict=True)

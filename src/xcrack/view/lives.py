@@ -250,10 +250,11 @@ def _named_laws(laws: Any, units: str) -> dict[str, Any]:
         raise ProblemError(
             "plot_rates: laws: give a mapping of names to laws, or a list of metals of xc.material."
         )
-    others = [metal.name for metal in laws if metal.units != units]
-    if others:
+    other_names = [metal.name for metal in laws if metal.units != units]
+    if other_names:
         raise ProblemError(
-            f"plot_rates: {others[0]!r} is not in {units!r}: give all metals in the units drawn."
+            f"plot_rates: {other_names[0]!r} is not in {units!r}: give all metals in the units "
+            "drawn."
         )
     return {metal.name: metal.law() for metal in laws if metal.laws}
 
@@ -287,17 +288,19 @@ def draw_sweep(
     rows: NDArray[Any], keys: Sequence[str], result: str, file: Path, title: str
 ) -> None:
     """Draw a column of a study over its first key; cases that failed are left out."""
-    key, others = keys[0], keys[1:]
+    key, other_keys = keys[0], keys[1:]
     is_good = np.isfinite(rows[result])
     figure = new_figure((6.4, 4.8), False, "sweep")
     axes = figure.add_subplot()
     lines: dict[tuple[Any, ...], list[int]] = {}
     for n in np.nonzero(is_good)[0].tolist():
-        lines.setdefault(tuple(rows[name][n] for name in others), []).append(n)
+        lines.setdefault(tuple(rows[name][n] for name in other_keys), []).append(n)
     for values, line in lines.items():
-        label = ", ".join(f"{name} = {_text(v)}" for name, v in zip(others, values, strict=True))
+        label = ", ".join(
+            f"{name} = {_text(v)}" for name, v in zip(other_keys, values, strict=True)
+        )
         axes.plot(_places(rows[key][line]), rows[result][line], "o-", ms=4, label=label or None)
-    if others and len(lines) <= _NAMED:
+    if other_keys and len(lines) <= _NAMED:
         axes.legend(fontsize="small")
     n_failed = int((~is_good).sum())
     words = f"{result} of {title}" + (

@@ -356,8 +356,8 @@ def _parts(n: int) -> Floats:
             parts.append([(i, j), (i + 1, j), (i, j + 1)])
             if i + j < n - 1:
                 parts.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
-    two = np.array(parts) / n
-    return np.concatenate([two, 1 - two.sum(axis=2, keepdims=True)], axis=2)
+    bary = np.array(parts) / n
+    return np.concatenate([bary, 1 - bary.sum(axis=2, keepdims=True)], axis=2)
 
 
 __all__ = ["draw_cracks"]

@@ -53,9 +53,11 @@ def given_plane(
     """
     try:
         origin, axes = value
-        x, two = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
-        lengths = np.linalg.norm(two, axis=1, keepdims=True)
-        right_axis, second = two / np.where((lengths > 0) & np.isfinite(lengths), lengths, np.inf)
+        x, directions = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
+        lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+        right_axis, second = directions / np.where(
+            (lengths > 0) & np.isfinite(lengths), lengths, np.inf
+        )
         up = second - (second @ right_axis) * right_axis
         length = float(np.linalg.norm(up))
         if length > 1e-6 and right_axis.any():
@@ -98,10 +100,12 @@ def best_plane(x: Floats, normal: ArrayLike | None = None) -> Projection:
     up_axis = np.eye(3)[1 if abs(n[2]) > 0.9 else 2]
     right_axis = np.cross(up_axis, n)
     right_axis /= np.linalg.norm(right_axis)
-    two = np.stack([right_axis, np.cross(n, right_axis)])
+    plane_axes = np.stack([right_axis, np.cross(n, right_axis)])
     # A direction along an axis shows the coordinate itself.
-    is_in_plane = np.abs(two).max(axis=1) > _AXIS
-    return Projection(lock(middle - (is_in_plane * (two @ middle)) @ two), lock(two))
+    is_in_plane = np.abs(plane_axes).max(axis=1) > _AXIS
+    return Projection(
+        lock(middle - (is_in_plane * (plane_axes @ middle)) @ plane_axes), lock(plane_axes)
+    )
 
 
 def on_plane(x: Floats, plane: Projection) -> Floats:

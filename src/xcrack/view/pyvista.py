@@ -404,7 +404,7 @@ def _add_points(plotter: Any, picture: SpaceScene, step: Floats) -> None:
 
 def _add_arrows(pv: Any, plotter: Any, arrows: tuple[Floats, Floats]) -> None:
     start, vector = arrows
-    longest = float(np.linalg.norm(vector, axis=1).max(initial=0.0))
+    longest_arrow = float(np.linalg.norm(vector, axis=1).max(initial=0.0))
     parts = []
     for x, v in zip(start, vector, strict=True):
         length = float(np.linalg.norm(v))
@@ -414,9 +414,9 @@ def _add_arrows(pv: Any, plotter: Any, arrows: tuple[Floats, Floats]) -> None:
                 start=x,
                 direction=v,
                 scale=length,
-                tip_length=min(0.35 * longest / length, 0.8),
-                tip_radius=0.11 * longest / length,
-                shaft_radius=0.04 * longest / length,
+                tip_length=min(0.35 * longest_arrow / length, 0.8),
+                tip_radius=0.11 * longest_arrow / length,
+                shaft_radius=0.04 * longest_arrow / length,
             )
         )
     if parts:

@@ -151,9 +151,9 @@ def _margins(source: Source) -> Rows:
     if known_validity is None or np.isnan(known_validity.zone):
         yield "plastic zone, net section", "not judged: no yield stress is known"
         return
-    worst = np.nanmax([known_validity.of_crack, known_validity.of_ligament])
-    words = f"plastic zone {100 * worst:.3g} % of the crack or ligament"
-    yield "linear elasticity", _verdict(words, worst <= ZONE)
+    largest_share = np.nanmax([known_validity.of_crack, known_validity.of_ligament])
+    words = f"plastic zone {100 * largest_share:.3g} % of the crack or ligament"
+    yield "linear elasticity", _verdict(words, largest_share <= ZONE)
     if not np.isnan(known_validity.of_section):
         share = known_validity.of_section
         yield "net section", _verdict(f"{100 * share:.3g} % of the load that yields it", share < 1)

@@ -411,8 +411,8 @@ def _viewing_direction(
     else:
         return np.asarray(usual_direction / np.linalg.norm(usual_direction))
     side = usual_direction - 0.999 * (usual_direction @ direction) * direction
-    both = direction + 0.75 * side / np.linalg.norm(side)
-    return np.asarray(both / np.linalg.norm(both))
+    viewing_direction = direction + 0.75 * side / np.linalg.norm(side)
+    return np.asarray(viewing_direction / np.linalg.norm(viewing_direction))
 
 
 def _face_normals(lips: LipFaces) -> Floats:

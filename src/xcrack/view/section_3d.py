@@ -192,15 +192,15 @@ def faces(body: Pieces, curved_sides: CurvedSides | None) -> Faces:
             groups[1].append(_small_faces(block[is_on_lip], face))
             for i, j in ((0, 1), (1, 2), (0, 2)):
                 a, b = face[i], face[j]
-                two = zero[:, a] & zero[:, b]
+                is_zero_side = zero[:, a] & zero[:, b]
                 edge = np.zeros(len(block), dtype=bool)
                 feature = np.zeros(len(block), dtype=bool)
                 for e, (p, q) in enumerate(local_edges(3)):
                     r, s = (v for v in range(4) if v not in (p, q))
-                    on = two[:, r] & two[:, s]
+                    on = is_zero_side[:, r] & is_zero_side[:, s]
                     edge |= on
                     feature |= on & is_sharp[mesh.cell_to_edge[cell, e]]
-                mouth = is_on_lip & (two & rim[cell]).any(axis=1)
+                mouth = is_on_lip & (is_zero_side & rim[cell]).any(axis=1)
                 for k, rows in enumerate((is_outside & feature, mouth, is_outside & edge)):
                     lines[k].append(_halves(block[rows], a, b))
                     each = len(lines[k][-1]) // max(int(rows.sum()), 1)

@@ -84,8 +84,10 @@ def _lines(segments: Floats, colour: str, width: float, dim: int, order: int = 2
 def _edges(mesh: Mesh) -> Floats:
     """Edges of a body in space at which its sides bend `(k, 2, 3)`."""
     facets = mesh.boundary
-    one, two = (mesh.points[facets[:, k]] - mesh.points[facets[:, 0]] for k in (1, 2))
-    normal = np.cross(one, two)
+    first_side, second_side = (
+        mesh.points[facets[:, k]] - mesh.points[facets[:, 0]] for k in (1, 2)
+    )
+    normal = np.cross(first_side, second_side)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     pairs = np.sort(np.concatenate([facets[:, [0, 1]], facets[:, [1, 2]], facets[:, [2, 0]]]), 1)
     order = np.lexsort(pairs.T)

@@ -109,7 +109,7 @@ def take_stress(  # type: ignore[no-untyped-def]
     lam, mu : float
     """
     slope, part = np.empty((4, 2)), np.zeros((2, strain.shape[3], 4))
-    both, direct_part = lam + 2.0 * mu, np.zeros((4, 3))
+    P_modulus, direct_part = lam + 2.0 * mu, np.zeros((4, 3))
     for q in range(len(cell)):
         e, w = cell[q], weight[q]
         _slopes(bary[q], gradient[e], sign[e], slope)
@@ -124,8 +124,8 @@ def take_stress(  # type: ignore[no-untyped-def]
                 part[1, m, a] -= s01 * slope[a, 0] + s11 * slope[a, 1]
         for a in range(4):
             x, y = slope[a, 0], slope[a, 1]
-            direct_part[a, 0] += w * (both * x * x + mu * y * y)
-            direct_part[a, 1] += w * (both * y * y + mu * x * x)
+            direct_part[a, 0] += w * (P_modulus * x * x + mu * y * y)
+            direct_part[a, 1] += w * (P_modulus * y * y + mu * x * x)
             direct_part[a, 2] += w * (lam + mu) * x * y
         if _is_same_side(cell, side, q):
             continue
@@ -186,7 +186,7 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
         Mean of the products of its derivatives.
     """
     columns = coefficients.shape[2]
-    both = lam + 2.0 * mu
+    P_modulus = lam + 2.0 * mu
     stress = np.empty((columns, 3, 3))  # corner; xx, yy, xy
     d, displaced = np.empty((6, 2)), np.empty((4, 3, 2))
     for k in range(len(cells)):
@@ -239,7 +239,7 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
                     y2 += t * G[b, 1] * G[c, 1]
                     xy += t * G[b, 0] * G[c, 1]
             block = blocks[f]
-            block[0, 0] += both * x2 + mu * y2
-            block[1, 1] += both * y2 + mu * x2
+            block[0, 0] += P_modulus * x2 + mu * y2
+            block[1, 1] += P_modulus * y2 + mu * x2
             block[0, 1] += (lam + mu) * xy
             block[1, 0] += (lam + mu) * xy

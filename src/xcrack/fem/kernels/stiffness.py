@@ -132,7 +132,7 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
     """
     n, d = slot.shape[1], gradient.shape[2]
     G = np.empty((n, d))
-    both = lam + 2.0 * mu
+    P_modulus = lam + 2.0 * mu
     for e in cells:
         is_touched = False
         for a in range(n):
@@ -163,10 +163,10 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
                         k = slot[e, a, b]
                         bx, by = G[b, 0], G[b, 1]
                         xx, yy, xy, yx = ax * bx, ay * by, ax * by, ay * bx
-                        data[k, 0, 0] += both * xx + mu * yy
+                        data[k, 0, 0] += P_modulus * xx + mu * yy
                         data[k, 0, 1] += lam * xy + mu * yx
                         data[k, 1, 0] += lam * yx + mu * xy
-                        data[k, 1, 1] += both * yy + mu * xx
+                        data[k, 1, 1] += P_modulus * yy + mu * xx
                 continue
             for a in range(n):
                 if not low <= slot[e, a, 0] < high:

@@ -122,10 +122,10 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
     """
     first, begin, in_parent, start, row, value, order, rank = fronts
     parts = len(order)
-    longest = 0
+    most_rows = 0
     for t in range(parts):
-        longest = max(longest, begin[t + 1] - begin[t])
-    run = np.empty(longest + 1, np.int64)
+        most_rows = max(most_rows, begin[t + 1] - begin[t])
+    run = np.empty(most_rows + 1, np.int64)
     size, factors, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
     factors[0], factors[1] = 1.0, -1.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R

@@ -163,16 +163,16 @@ def _is_inside(  # type: ignore[no-untyped-def]
     points, cells, gradient, e, x, tolerance, coordinates
 ):
     """Whether a cell has a point, whose barycentric coordinates are set."""
-    d, total, smallest = points.shape[1], 0.0, 1.0
+    d, total, least_coordinate = points.shape[1], 0.0, 1.0
     for i in range(1, d + 1):
         coordinates[i] = 0.0
         for j in range(d):
             coordinates[i] += gradient[e, i, j] * (x[j] - points[cells[e, 0], j])
         total += coordinates[i]
-        if coordinates[i] < smallest:
-            smallest = coordinates[i]
+        if coordinates[i] < least_coordinate:
+            least_coordinate = coordinates[i]
     coordinates[0] = 1 - total
-    return smallest >= -tolerance and coordinates[0] >= -tolerance
+    return least_coordinate >= -tolerance and coordinates[0] >= -tolerance
 
 
 @kernel
@@ -330,22 +330,22 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
     start = 0
     for i in range(n):
         p, q, r = x[i, 0], x[i, 1], x[i, 2]
-        best, smallest, where = bound, bound * bound, -1
+        least_distance, least_square, nearest_number = bound, bound * bound, -1
         for k in range(-1, stretches):
             b = start if k < 0 else k
             if k == start:
                 continue
             square = _square_distance(p, q, r, middle, b)
-            if square >= (best + reach[b]) ** 2:
+            if square >= (least_distance + reach[b]) ** 2:
                 continue
             is_closer = False
             for v in range(b * each, min(count, (b + 1) * each)):
                 square = _square_distance(p, q, r, vertices, v)
-                if square < smallest:
-                    smallest, where, is_closer = square, v, True
+                if square < least_square:
+                    least_square, nearest_number, is_closer = square, v, True
             if is_closer:
-                best = math.sqrt(smallest)
-        if where >= 0:
-            nearest[i], distance[i] = where, best
-            start = where // each
+                least_distance = math.sqrt(least_square)
+        if nearest_number >= 0:
+            nearest[i], distance[i] = nearest_number, least_distance
+            start = nearest_number // each
     return nearest, distance

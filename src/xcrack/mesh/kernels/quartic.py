@@ -107,18 +107,20 @@ def _move_inside(table, nodes, target, bary, work):  # type: ignore[no-untyped-d
         if not determinant > 1e-12 * aa * bb:
             return np.inf
         u, v = (ea * bb - eb * ab) / determinant, (eb * aa - ea * ab) / determinant
-        longest = max(abs(u), abs(v))
-        if longest > _WIDEST:
-            u, v = u * _WIDEST / longest, v * _WIDEST / longest
+        step_length = max(abs(u), abs(v))
+        if step_length > _WIDEST:
+            u, v = u * _WIDEST / step_length, v * _WIDEST / step_length
         bary[1] += u
         bary[2] += v
         bary[0] = 1.0 - bary[1] - bary[2]
-        smallest = min(bary[0], bary[1], bary[2])
-        if smallest < -2 * _WIDEST or (longest < _NEARLY and smallest < -10 * longest):
+        least_coordinate = min(bary[0], bary[1], bary[2])
+        if least_coordinate < -2 * _WIDEST or (
+            step_length < _NEARLY and least_coordinate < -10 * step_length
+        ):
             return np.inf
-        if longest <= _AT_REST:
+        if step_length <= _AT_REST:
             break
-    if smallest < 0.0:
+    if least_coordinate < 0.0:
         return np.inf
     _place(table, nodes, bary, x, tangents, value, slope)
     return square
@@ -163,7 +165,7 @@ def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radiu
     bary, tried_pieces = np.empty(corners), np.empty(_MOST_PIECES, np.int64)
     start = np.empty((_MOST_PIECES, corners))
     for q in range(len(x)):
-        smallest, count = np.inf, 0
+        least_square, count = np.inf, 0
         for n in candidates[q]:
             for row in range(offsets[n], offsets[n + 1]):
                 f = piece[row]
@@ -176,15 +178,15 @@ def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radiu
                 for j in range(corners):
                     bary[j] = start[count, j] = table[local[row], j] / 4.0
                 count += 1
-                if corners == 3 and _may_be_nearer(x[q], centre[f], radius[f], smallest):
+                if corners == 3 and _may_be_nearer(x[q], centre[f], radius[f], least_square):
                     square = _move_inside(table, nodes[f], x[q], bary, work)
-                    if square < smallest:
-                        smallest, owner[q] = square, f
+                    if square < least_square:
+                        least_square, owner[q] = square, f
                         foot[q] = work[0]
         # Edges after all insides: most of them are farther than what has been found.
         for c in range(count):
             f = tried_pieces[c]
-            if not _may_be_nearer(x[q], centre[f], radius[f], smallest):
+            if not _may_be_nearer(x[q], centre[f], radius[f], least_square):
                 continue
             edge = corners + 1  # the node at the middle of the first edge; of the next, three on
             for first in range(corners - 1):
@@ -195,12 +197,12 @@ def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radiu
                         one, other = nodes[f, first, i] - middle[i], nodes[f, second, i] - middle[i]
                         half = max(half, abs(one), abs(other))
                     edge += 3
-                    if not _may_be_nearer(x[q], middle, _ROOMY * math.sqrt(d) * half, smallest):
+                    if not _may_be_nearer(x[q], middle, _ROOMY * math.sqrt(d) * half, least_square):
                         continue
                     bary[:] = start[c]
                     square = _along_edge(table, nodes[f], x[q], bary, first, second, work)
-                    if square < smallest:
-                        smallest, owner[q] = square, f
+                    if square < least_square:
+                        least_square, owner[q] = square, f
                         foot[q] = work[0]
     return foot, owner
 

@@ -267,21 +267,21 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
         x, y = end[s, 0] - begin[s, 0], end[s, 1] - begin[s, 1]
         length = math.sqrt(x * x + y * y)
         middle0, middle1 = (begin[s, 0] + end[s, 0]) / 2, (begin[s, 1] + end[s, 1]) / 2
-        nearest, smallest = -1, np.inf
+        nearest_tip, least_distance = -1, np.inf
         for t in range(len(tips)):
             a, b = middle0 - tips[t, 0], middle1 - tips[t, 1]
             distance = math.sqrt(a * a + b * b)
-            if distance < smallest:
-                nearest, smallest = t, distance
+            if distance < least_distance:
+                nearest_tip, least_distance = t, distance
         is_near, foot = False, 0.0
-        if nearest >= 0:
-            a, b = tips[nearest, 0] - begin[s, 0], tips[nearest, 1] - begin[s, 1]
+        if nearest_tip >= 0:
+            a, b = tips[nearest_tip, 0] - begin[s, 0], tips[nearest_tip, 1] - begin[s, 1]
             square = x * x + y * y
             foot = (a * x + b * y) / square if square > 1e-300 else 0.0
             # A part as long as the round-off of coordinates would have points on the tip itself.
             largest = max(
                 abs(begin[s, 0]), abs(begin[s, 1]), abs(end[s, 0]), abs(end[s, 1]),
-                abs(tips[nearest, 0]), abs(tips[nearest, 1]),
+                abs(tips[nearest_tip, 0]), abs(tips[nearest_tip, 1]),
             )  # fmt: skip
             close_share = max(_FOOT, min(0.5, _ROUND_OFF * largest / max(length, 1e-300)))
             if abs(foot) < close_share:
@@ -289,8 +289,8 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
             elif abs(foot - 1) < close_share:
                 foot = 1.0
             position = min(max(foot, 0.0), 1.0)
-            a = begin[s, 0] + position * x - tips[nearest, 0]
-            b = begin[s, 1] + position * y - tips[nearest, 1]
+            a = begin[s, 0] + position * x - tips[nearest_tip, 0]
+            b = begin[s, 1] + position * y - tips[nearest_tip, 1]
             is_near = math.sqrt(a * a + b * b) < length
         for part in range(2):
             sign = 1.0 if part == 1 else -1.0
@@ -543,8 +543,8 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
 
 @kernel
 def triangle_points(  # type: ignore[no-untyped-def]
-    bary, corners, share, bears_tip, fan, tips, levels, plain_rule, plain_share, near, near_share,
-    s, ws, t, wt, centre, radii,
+    bary, corners, share, bears_tip, fan, tips, levels, plain_rule, plain_share, rule_near,
+    rule_near_share, s, ws, t, wt, centre, radii,
 ):  # fmt: skip
     """Integration points of triangles, denser towards tips where their functions act.
 
@@ -565,7 +565,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
         Most bisections.
     plain_rule, plain_share : (p, 3) and (p,) arrays
         Rule of triangles without tip functions.
-    near, near_share : (p, 3) and (p,) arrays
+    rule_near, rule_near_share : (p, 3) and (p,) arrays
         Rule of those with tip functions that lie away from tips.
     s, ws, t, wt : (i,) and (j,) arrays
         Gauss rules of fans, along the radius and across.
@@ -627,7 +627,9 @@ def triangle_points(  # type: ignore[no-untyped-def]
                     tip_of_part, least_distance = m, distance
             # Equal lengths are common in regular meshes: round-off must not decide.
             if size <= (1.0 + _SAME) * least_distance:
-                table, count = _put_rule(table, count, k, vertex, fraction, near, near_share)
+                table, count = _put_rule(
+                    table, count, k, vertex, fraction, rule_near, rule_near_share
+                )
                 continue
             if level == levels:
                 table, count = _put_fans_around(

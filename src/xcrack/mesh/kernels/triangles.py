@@ -183,14 +183,14 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
 @kernel
 def _push_children(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
     """Put two children on the stack, the nearer one on top, and return the new top."""
-    one = _to_box(p, low[child], high[child])
-    two = _to_box(p, low[child + 1], high[child + 1])
+    square = _to_box(p, low[child], high[child])
+    other_square = _to_box(p, low[child + 1], high[child + 1])
     nearer_child, other = child, child + 1
-    if two < one:
+    if other_square < square:
         nearer_child, other = other, nearer_child
-        one, two = two, one
-    stack[top + 1], stack_square[top + 1] = other, two
-    stack[top + 2], stack_square[top + 2] = nearer_child, one
+        square, other_square = other_square, square
+    stack[top + 1], stack_square[top + 1] = other, other_square
+    stack[top + 2], stack_square[top + 2] = nearer_child, square
     return top + 2
 
 

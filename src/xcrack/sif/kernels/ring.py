@@ -236,11 +236,11 @@ def add_points(  # type: ignore[no-untyped-def]
     """
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
     local, bend = np.empty((2, 2, total.shape[0])), np.empty((3, 2, 2))
-    largest, smallest = radii[0], inner[0]
+    largest_radius, least_radius = radii[0], inner[0]
     for k in range(1, len(radii)):
-        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
+        largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, inner[k])
     if change is not None:
-        smallest = 0.0
+        least_radius = 0.0
     for p in range(len(weight)):
         dx, dy, psi_sum = -tip[0], -tip[1], 0.0
         for b in range(3):
@@ -248,7 +248,7 @@ def add_points(  # type: ignore[no-untyped-def]
             dx += bary[p, b] * points[node, 0]
             dy += bary[p, b] * points[node, 1]
             psi_sum += psi[node]
-        if smallest * smallest < dx * dx + dy * dy < largest * largest:
+        if least_radius * least_radius < dx * dx + dy * dy < largest_radius * largest_radius:
             _into_frame(frame, gradient[p], turn, local)
             _add_point(
                 total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame, modes,
@@ -296,11 +296,11 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
     gradient, corner = np.empty((2, 2, states)), np.empty((3, 2, 2, states))
     local, bend = np.empty((2, 2, states)), np.empty((3, 2, 2))
-    largest, smallest = radii[0], inner[0]
+    largest_radius, least_radius = radii[0], inner[0]
     for k in range(1, len(radii)):
-        largest, smallest = max(largest, radii[k]), min(smallest, inner[k])
+        largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, inner[k])
     if change is not None:
-        smallest = 0.0
+        least_radius = 0.0
     for place in range(len(chosen)):
         e = chosen[place]
         is_behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
@@ -325,7 +325,11 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
             for b in range(3):
                 dx += bary[p, b] * points[cells[e, b], 0]
                 dy += bary[p, b] * points[cells[e, b], 1]
-            if not smallest * smallest < dx * dx + dy * dy < largest * largest:
+            if (
+                not least_radius * least_radius
+                < dx * dx + dy * dy
+                < largest_radius * largest_radius
+            ):
                 continue
             for i in range(2):
                 for j in range(2):
