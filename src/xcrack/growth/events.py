@@ -7,7 +7,6 @@ import numpy as np
 
 from xcrack.base.arrays import Floats, at, coordinates
 from xcrack.base.errors import GeometryError
-from xcrack.crack.boundary_trace import ON
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import closed_fronts, front_frames
 from xcrack.crack.measures import exit_ahead, facet_names, front_ends
@@ -21,7 +20,7 @@ from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Arrival, Join, Plan, Step, moved_places, plan_of
 from xcrack.linalg.rigid_motion import pieces
 from xcrack.mesh.distances import signed_in
-from xcrack.mesh.locate import Body
+from xcrack.mesh.locate import ON, Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
 
