@@ -12,6 +12,8 @@ from xcrack.base.errors import GeometryError
 # Points among which the first guess of a foot is looked for: in all, and at least on a piece.
 _SAMPLES, _LEAST = 400, 3
 _STRAIGHT = 1e-9  # turn of a front over its whole length that is round-off
+_ARCS = 4  # times at most that the arc lengths of the vertices are measured along a spline
+_SAME = 1e-14  # of the length of a front: change of arc lengths that is round-off
 _GAUSS = np.polynomial.legendre.leggauss(6)
 
 
@@ -246,19 +248,19 @@ def front_curve(x: Floats, frame: Floats, is_closed: bool) -> FrontCurve:
         raise GeometryError("the vertices of a crack front run against b = t × n: reverse them.")
     ends = "periodic" if is_closed else "not-a-knot"
     break_arcs = np.concatenate([[0.0], np.cumsum(chord)])
-    for _ in range(4):
+    for _ in range(_ARCS):
         place = CubicSpline(break_arcs, x, bc_type=ends)
         step = np.diff(break_arcs)
         t = break_arcs[:-1, None] + step[:, None] * (_GAUSS[0] + 1) / 2
         speed = np.linalg.norm(place(t, 1), axis=2)
+        previous_arcs = break_arcs
         break_arcs = np.concatenate([[0.0], np.cumsum(step * (speed @ _GAUSS[1]) / 2)])
-    place, normal_spline = (
-        CubicSpline(break_arcs, x, bc_type=ends),
-        CubicSpline(break_arcs, normal, bc_type=ends),
-    )
+        if np.abs(break_arcs - previous_arcs).max() <= _SAME * break_arcs[-1]:
+            break
+    spline = CubicSpline(break_arcs, np.concatenate([x, normal], axis=1), bc_type=ends)
     return FrontCurve(
         lock(break_arcs),
-        lock(np.ascontiguousarray(place.c)),
-        lock(np.ascontiguousarray(normal_spline.c)),
+        lock(np.ascontiguousarray(spline.c[..., :3])),
+        lock(np.ascontiguousarray(spline.c[..., 3:])),
         is_closed,
     )

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from xcrack.base.arguments import Part, check_arguments
-from xcrack.base.arrays import Bools, Floats, Ints, ranges
+from xcrack.base.arrays import Bools, Floats, Ints, lock, ranges
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.junctions_3d import body_of
@@ -223,12 +222,13 @@ def cells_deep(x: Floats, front: Floats, mesh: Mesh) -> float:
         Points on its faces in the body, and along its fronts.
     mesh : Mesh
     """
-    tree = cKDTree(front)
-    depth = float(tree.query(x[:: len(x) // _SAMPLES + 1])[0].max())
+    from xcrack.mesh.kernels.location import nearest_vertices
+
+    points, vertices = lock(x[:: len(x) // _SAMPLES + 1].copy()), lock(front.copy())
+    depth = float(nearest_vertices(points, vertices, np.inf)[1].max())
     cells = np.arange(0, len(mesh.cells), len(mesh.cells) // _SAMPLES + 1)
-    centre = mesh.points[mesh.cells[cells]].mean(axis=1)
-    distance = tree.query(centre, distance_upper_bound=_AROUND * depth)[0]
-    cells = cells[np.isfinite(distance)]
+    middle = lock(mesh.cell_middles[cells])
+    cells = cells[nearest_vertices(middle, vertices, _AROUND * depth)[0] >= 0]
     if not len(cells):
         return 0.0
     return depth / float(np.average(leg_sizes(mesh, cells), weights=mesh.volume[cells]))

@@ -82,12 +82,16 @@ def points_on_triangles(
     share = np.ones(len(x))
     for _ in range(halvings):
         is_near = r.min(axis=1) < size
+        if not is_near.any():
+            break
         parts = np.einsum("cvw,swb->scvb", quarters(), corner[is_near]).reshape(-1, 3, 3)
-        of = np.concatenate([of[~is_near], np.repeat(of[is_near], 4)])
+        of_parts = np.repeat(of[is_near], 4)
+        r_of_parts = radius_at(space, nodes[of_parts], parts @ bary[of_parts])
+        of = np.concatenate([of[~is_near], of_parts])
         corner = np.concatenate([corner[~is_near], parts])
         share = np.concatenate([share[~is_near], np.repeat(share[is_near] / 4, 4)])
         size = np.concatenate([size[~is_near], np.repeat(size[is_near] / 2, 4)])
-        r = radius_at(space, nodes[of], corner @ bary[of])
+        r = np.concatenate([r[~is_near], r_of_parts])
     number, place, rule = triangle_points(r, size)
     place = np.einsum("qv,qvb->qb", place, corner[number])
     weight = (area[of] * share)[number] * rule

@@ -194,23 +194,23 @@ def _points_on_facets(
     cell = mesh.facet_to_cell[number, 0]
     parts = space.geometry.split_facets(space, facets)
     k, place, weight = part_points(space, facets[parts.number], parts.bary, n, halvings)
+    is_vertex = mesh.cells[cell][:, :, None] == facets[:, None, :]
+    # The parts in their cells, and the normals of facets: points have those of theirs.
+    corners = np.einsum("svf,saf->sav", is_vertex[parts.number].astype(float), parts.bary)
+    opposite_corner = (~is_vertex.any(axis=2)).argmax(axis=1)
+    inward_normal = mesh.gradient[cell, opposite_corner]
+    normal = -inward_normal / np.linalg.norm(inward_normal, axis=1, keepdims=True)
+    order = np.argsort(cell[parts.number[k]], kind="stable")
+    k = k[order]
     owner = parts.number[k]
     c = cell[owner]
-    # Place of each point of the facet among those of its cell.
-    is_vertex = mesh.cells[c][:, :, None] == facets[owner][:, None, :]
-    on_facet = np.einsum("qv,qvb->qb", place, parts.bary[k])
-    bary = np.einsum("qvf,qf->qv", is_vertex.astype(float), on_facet)
-    opposite_corner = (~is_vertex.any(axis=2)).argmax(axis=1)
-    inward_normal = mesh.gradient[c, opposite_corner]
-    normal = -inward_normal / np.linalg.norm(inward_normal, axis=1, keepdims=True)
+    bary = np.einsum("qa,qav->qv", place[order], corners[k])
     side = cell_side(space, c)
     for i, cut in enumerate(space.cuts):
         is_crossed = cut.is_cut[c] | (cut.is_tip[c] & (side[:, i] == 0))
         side[is_crossed, i] = parts.side[k, i][is_crossed]
     side = at_joints(space, c, bary, side)
-    order = np.argsort(c, kind="stable")
-    points = Points(c[order], bary[order], weight[order], side[order])
-    return points, normal[order], owner[order]
+    return Points(c, bary, weight[order], side), normal[owner], owner
 
 
 def _subtract_stress(f: Floats, space: FunctionSpace, points: Points, sigma: Floats) -> None:

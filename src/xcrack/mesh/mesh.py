@@ -256,6 +256,14 @@ class Mesh:
         return lock(np.sqrt(size))
 
     @cached_property
+    def cell_middles(self) -> Floats:
+        """Centroid of each cell `(m, d)`, length."""
+        middle = np.zeros((len(self.cells), self.dim))
+        for corner in self.cells.T:
+            middle += self.points[corner]
+        return lock(middle / (self.dim + 1))
+
+    @cached_property
     def extent(self) -> float:
         """Largest side of the box around the body, length."""
         return float(np.max(np.ptp(self.points, axis=0)))
@@ -281,7 +289,7 @@ class Mesh:
     @cached_property
     def cell_tree(self) -> cKDTree:
         """Search tree of the centroids of the cells."""
-        return cKDTree(self.points[self.cells].mean(axis=1))
+        return cKDTree(self.cell_middles)
 
     @cached_property
     def cell_grid(self) -> tuple[tuple[Floats, Floats, Ints, Ints], Ints]:

@@ -425,7 +425,7 @@ def _domain_parts(
     outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     initial_stress, elasticity = initial_stresses(solutions), solutions[0].problem.elasticity
-    middle = mesh.points[mesh.cells].mean(axis=1)
+    middle = mesh.cell_middles
     reach = 1.05 * outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
     cells = np.nonzero(distance <= mesh.cell_size)[0]

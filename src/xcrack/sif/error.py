@@ -221,7 +221,7 @@ def _cells_near(solution: Solution, x: Floats) -> Bools:
     mesh = solution.problem.mesh
     if not len(x):
         return np.zeros(len(mesh.cells), dtype=bool)
-    middle = mesh.points[mesh.cells].mean(axis=1)
+    middle = mesh.cell_middles
     distance = np.linalg.norm(middle[:, None] - x, axis=2)
     return np.asarray((distance < _NEAR * cell_sizes(mesh, x)).any(axis=1))
 
@@ -747,7 +747,7 @@ def finer_along(problem: Problem, crack: int) -> Mesh:
     front = cKDTree(
         points_between([placed_crack.points[front] for front in placed_crack.fronts or ()])
     )
-    centre = mesh.points[mesh.cells].mean(axis=1)
+    centre = mesh.cell_middles
     is_near = front.query(centre)[0] <= _NEAR_FRONT * mesh.cell_size
     each = np.where(is_near, mesh.cell_size / FINER, np.inf)
 

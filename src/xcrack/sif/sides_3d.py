@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
-from xcrack.base.arrays import Bools, Floats, Ints
+from xcrack.base.arrays import Bools, Floats
 from xcrack.crack.front_curve import FootPoints, FrontCurve
 from xcrack.fem.facets import part_points
 from xcrack.fem.function_space import FunctionSpace
@@ -117,13 +117,16 @@ def _boundary_around(
     near_points, feet = curve.points_near(position(space, points.cell, points.bary), reach)
     if not len(near_points):
         return None
-    counts = before_junctions(space, crack, points.chosen(near_points))
-    near_points, feet = near_points[counts], feet.chosen(counts)
-    if not len(near_points):
-        return None
     points, normal = points.chosen(near_points), normal[near_points]
-    facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
-    axes = _fixed_axes(solutions, facet)
+    counts = before_junctions(space, crack, points)
+    if not counts.any():
+        return None
+    if not counts.all():
+        points, normal, feet = points.chosen(counts), normal[counts], feet.chosen(counts)
+    axes = _fixed_axes(solutions, points)
+    if axes is None:
+        no_points = np.zeros(len(points.cell), dtype=bool)
+        return Sides(points, normal, feet, no_points, no_points)
     is_along_axis = np.abs(np.einsum("qd,qd->q", normal, axes)) > 1 - _ALONG
     is_across_front = np.abs(np.einsum("qd,qd->q", normal, feet.frame[:, 2])) > _ACROSS
     is_smooth = (axes.sum(axis=1) == 1) & is_along_axis & is_across_front
@@ -158,14 +161,20 @@ def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: fl
     return result
 
 
-def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> Floats:
-    """One where a direction is held on facets `(q, 3)`, else zero."""
+def _fixed_axes(solutions: Sequence[Solution], points: Points) -> Floats | None:
+    """One where a direction is held at points of the boundary `(q, 3)`, else zero; or None."""
     mesh = solutions[0].space.mesh
-    axes = np.zeros((len(facet), 3))
     loads = [load for s in solutions for load in s.loads if isinstance(load, Support)]
-    for support in dict.fromkeys([*solutions[0].problem.supports, *loads]):
-        if not isinstance(support.where, str):
-            continue
+    supports = [
+        support
+        for support in dict.fromkeys([*solutions[0].problem.supports, *loads])
+        if isinstance(support.where, str)
+    ]
+    if not supports:
+        return None
+    axes = np.zeros((len(points.cell), 3))
+    facet = mesh.cell_to_facet[points.cell, points.bary.argmin(axis=1)]
+    for support in supports:
         is_of_set = np.isin(facet, numbers_of(mesh, facet_set(mesh, support.where, support.name)))
         if is_of_set.any():
             middle = mesh.points[mesh.facets[facet[is_of_set]]].mean(axis=1)
@@ -180,19 +189,20 @@ def _fixed_axes(solutions: Sequence[Solution], facet: Ints) -> Floats:
 def room_beside(sides: Sides, curve: FrontCurve, knots: Floats) -> Floats:
     """Distance of the hats to what is held, as far as it reaches into their domains `(p,)`."""
     room = np.full(len(knots), np.inf)
-    hat, share, _ = hats(curve, knots, sides.feet.s)
+    feet = sides.feet.chosen(sides.reaction)
+    hat, share, _ = hats(curve, knots, feet.s)
     for place, value in ((0, 1 - share), (1, share)):
-        counts = sides.reaction & (value > 0)
-        np.minimum.at(room, hat[counts, place], sides.feet.r[counts])
+        counts = value > 0
+        np.minimum.at(room, hat[counts, place], feet.r[counts])
     return room
 
 
 def on_smooth_planes(sides: Sides, curve: FrontCurve, knots: Floats) -> Bools:
     """Hats that are not zero on a smooth plane perpendicular to the front `(p,)`."""
     result = np.zeros(len(knots), dtype=bool)
-    hat, share, _ = hats(curve, knots, sides.feet.s)
+    hat, share, _ = hats(curve, knots, sides.feet.s[sides.is_smooth])
     for place, value in ((0, 1 - share), (1, share)):
-        result[hat[sides.is_smooth & (value > 0.5), place]] = True
+        result[hat[value > 0.5, place]] = True
     return result
 
 

@@ -422,6 +422,8 @@ def surface_terms(  # type: ignore[no-untyped-def]
     G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((0, 3, 2))
     S = np.empty((3, 3, 3))
     g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    domains = radii.shape[1]
+    value = np.empty((2, domains))
     for q in range(len(weight)):
         r = polar_place[q, 0]
         if r >= _largest_radius(radii, hat[q]) or r <= 0.0:
@@ -430,6 +432,11 @@ def surface_terms(  # type: ignore[no-untyped-def]
             m_out[a] = 0.0
             for i in range(3):
                 m_out[a] += frame[q, a, i] * outward_normal[q, i]
+        for side in range(2):
+            part = share[q] if side == 1 else 1.0 - share[q]
+            for k in range(domains):
+                Q, _ = _weight(r, radii[hat[q, side], k])
+                value[side, k] = weight[q] * part * Q
         ch, sh = math.cos(0.5 * polar_place[q, 1]), math.sin(0.5 * polar_place[q, 1])
         for mode in range(3):
             _set_unit_field(mode, r, ch, sh, kolosov, scale, U, U_turn, G, slope, spin, bend)
@@ -458,7 +465,5 @@ def surface_terms(  # type: ignore[no-untyped-def]
                         W += sigma[a, 0] * G[mode, a, 0] + sigma[a, 1] * G[mode, a, 1]
                     density -= W * m_out[0]
                 for side in range(2):
-                    part = share[q] if side == 1 else 1.0 - share[q]
-                    for k in range(radii.shape[1]):
-                        Q, _ = _weight(r, radii[hat[q, side], k])
-                        result[n, k, mode, hat[q, side]] -= weight[q] * part * Q * density
+                    for k in range(domains):
+                        result[n, k, mode, hat[q, side]] -= value[side, k] * density
