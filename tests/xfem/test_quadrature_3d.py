@@ -21,6 +21,7 @@ from xcrack.fem.quadrature import (
     sub_cells,
     triangle_points,
 )
+from xcrack.mesh.kernels.splitting import bisected_towards_fronts
 from xcrack.mesh.simplex import conical_rule
 
 CRACKS = {
@@ -288,3 +289,27 @@ def test_points_do_not_depend_on_the_order_of_corners(centre, graded):
         x = np.einsum("qb,qbd->qd", points.bary, mesh.points[cells[points.cell]])
         every.append(np.bincount(points.cell, points.weight * np.sin(9 * x).sum(axis=1)))
     np.testing.assert_allclose(every[1], every[0], atol=1e-14)
+
+
+def test_parts_for_K_are_no_larger_than_their_distance():
+    """Tetrahedra around two straight fronts: parts fill them, each is far enough or cut enough."""
+    rng = np.random.default_rng(5)
+    corner = rng.uniform(-1, 1, (40, 4, 3))
+    corner[0] += 30  # far from both fronts: one part
+    share = rng.uniform(0.01, 1, 40)
+    levels = np.stack([corner[..., 1:], corner[..., :2] - 0.3], axis=1)  # along x, and along z
+    number, bary, part = bisected_towards_fronts(
+        np.broadcast_to(np.eye(4), (40, 4, 4)).copy(), corner, levels, share, 0.7, 6, 1e-6
+    )
+    assert (np.diff(number) >= 0).all()
+    assert np.bincount(number)[0] == 1
+    np.testing.assert_allclose(np.bincount(number, part), share, rtol=1e-14)
+    np.testing.assert_allclose(np.abs(np.linalg.det(bary)) * share[number], part, rtol=1e-12)
+    x = np.einsum("svb,sbd->svd", bary, corner[number])
+    distance = np.minimum(np.hypot(x[..., 1], x[..., 2]), np.hypot(*(x[..., :2].T - 0.3)).T)
+    longest = np.linalg.norm(x[:, :, None] - x[:, None], axis=3).max(axis=(1, 2))
+    is_far = distance.min(axis=1) >= 0.7 * part**0.25 * longest * (1 - 1e-12)
+    times = np.log2(share[number] / part).round().astype(int)
+    assert times.max() == 6
+    assert (is_far | (times == 6)).all()
+    assert len(number) > 4 * len(corner)

@@ -112,13 +112,22 @@ def radius_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
     bary : (k, v, m) array
         Places in them.
     """
-    result = np.full(bary.shape[:2], np.inf)
-    for tip in space.tips:
+    return _radius(_levels_at(space, nodes, bary))
+
+
+def _levels_at(space: FunctionSpace, nodes: Ints, bary: Floats) -> Floats:
+    """Level sets of each front, linear in simplices, at places in them `(k, tips, v, 2)`."""
+    result = np.empty((len(nodes), len(space.tips), bary.shape[1], 2))
+    for t, tip in enumerate(space.tips):
         levels = space.cuts[tip.crack].level_set
-        phi = np.einsum("kvm,km->kv", bary, levels.phi[nodes])
-        psi = np.einsum("kvm,km->kv", bary, levels.psi[tip.number][nodes])
-        result = np.minimum(result, np.hypot(phi, psi))
+        for i, values in enumerate((levels.phi, levels.psi[tip.number])):
+            result[:, t, :, i] = np.einsum("kvm,km->kv", bary, values[nodes])
     return result
+
+
+def _radius(levels: Floats) -> Floats:
+    """Distance to the nearest front `(k, v)` of level sets `(k, tips, v, 2)`."""
+    return np.asarray(np.hypot(levels[..., 0], levels[..., 1]).min(axis=1, initial=np.inf))
 
 
 def front_points(
@@ -185,25 +194,19 @@ def graded_points(
     number, place, weight
         As of `front_points`.
     """
+    from xcrack.mesh.kernels.splitting import bisected_towards_fronts
+
     nodes = space.mesh.cells[cell]
     x = np.einsum("svb,sbd->svd", bary, space.mesh.points[nodes])
-    r, size = radius_at(space, nodes, bary), _longest_edges(x)
-    touching_parts, is_far = _on_front(bary, r, size)
+    levels = _levels_at(space, nodes, bary)
+    touching_parts, is_far = _on_front(bary, _radius(levels), _longest_edges(x))
     swept_parts = _swept_points(touching_parts, share, n)
-    number = np.nonzero(is_far)[0]
-    bary, share, x, r, size = (each[number] for each in (bary, share, x, r, size))
-    parts = []
-    for level in range(_BISECTIONS + 1):
-        near_size = (1 - _SAME) * _NEAR_OF_WHOLE * np.sqrt(np.sqrt(share)) * size
-        is_near = (r.min(axis=1) < near_size) & (level < _BISECTIONS)
-        parts.append((number[~is_near], bary[~is_near], share[~is_near]))
-        if not is_near.any():
-            break
-        number = np.concatenate([number[is_near], number[is_near]])
-        share = np.concatenate([share[is_near], share[is_near]]) / 2
-        bary, x = _halves(space, nodes[number[: len(number) // 2]], bary[is_near], x[is_near])
-        r, size = radius_at(space, nodes[number], bary), _longest_edges(x)
-    number, bary, share = _all_parts(parts)
+    rows = np.nonzero(is_far)[0]
+    number, bary, share = bisected_towards_fronts(
+        bary[rows], x[rows], levels[rows], share[rows], (1 - _SAME) * _NEAR_OF_WHOLE,
+        _BISECTIONS, _SAME,
+    )  # fmt: skip
+    number = rows[number]
     is_small = share < (1 - _SAME) * _LEAST_SHARE
     plain_parts = [
         _rule_points(number[rows], bary[rows], share[rows], simplex_rule(3, degree_of_part))
@@ -254,27 +257,6 @@ def _rule_points(
 def _all_parts(parts: list[_Parts]) -> _Parts:
     a, b, c = (np.concatenate(p) for p in zip(*parts, strict=True))
     return a, b, c
-
-
-def _halves(space: FunctionSpace, nodes: Ints, bary: Floats, x: Floats) -> tuple[Floats, Floats]:
-    """Both halves of sub-cells across the middle of their longest edge: first all of one kind.
-
-    Of equally long edges that counts whose middle is nearest to the front.
-    """
-    i, j = local_edges(3).T
-    length = np.linalg.norm(x[:, i] - x[:, j], axis=2)
-    longest_edge = length.max(axis=1, keepdims=True)
-    middle = radius_at(space, nodes, (bary[:, i] + bary[:, j]) / 2) / longest_edge
-    is_longest = length >= (1 - _SAME) * longest_edge
-    edge = np.where(is_longest, np.round(middle, 7), np.inf).argmin(axis=1)
-    a, b, row = i[edge], j[edge], np.arange(len(x))
-    halves = []
-    for values in (bary, x):
-        pair = [values.copy(), values.copy()]
-        for half, vertex in zip(pair, (a, b), strict=True):
-            half[row, vertex] = (values[row, a] + values[row, b]) / 2
-        halves.append(np.concatenate(pair))
-    return halves[0], halves[1]
 
 
 @lru_cache(maxsize=8)
@@ -661,13 +643,11 @@ def cell_points(
 def _sorted_points(
     space: FunctionSpace, subs: SubCells, numbers: Ints, every: Floats, part: Floats
 ) -> Points:
-    """Points of sub-cells, sorted by cell and sub-cell."""
+    """Points of sub-cells, sorted by sub-cell, and so by cell."""
+    order = np.argsort(numbers, kind="stable")
+    numbers = numbers[order]
     cell = subs.cell[numbers]
-    order = np.lexsort((numbers, cell))
-    cell = cell[order]
-    return Points(
-        cell, every[order], part[order] * space.mesh.volume[cell], subs.side[numbers[order]]
-    )
+    return Points(cell, every[order], part[order] * space.mesh.volume[cell], subs.side[numbers])
 
 
 __all__ = []

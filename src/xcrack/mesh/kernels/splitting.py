@@ -655,3 +655,112 @@ def triangle_points(  # type: ignore[no-untyped-def]
         for b in range(3):
             place[q, b] = table[q, 1 + b]
     return number, place, weight
+
+
+@kernel
+def _least_radius(levels, i, j):  # type: ignore[no-untyped-def]
+    """Distance to the nearest front in the middle of two vertices, or at one."""
+    r_min = np.inf
+    for t in range(len(levels)):
+        phi = 0.5 * (levels[t, i, 0] + levels[t, j, 0])
+        psi = 0.5 * (levels[t, i, 1] + levels[t, j, 1])
+        r_min = min(r_min, math.sqrt(phi * phi + psi * psi))
+    return r_min
+
+
+@kernel
+def bisected_towards_fronts(bary, x, levels, share, nearness, n_bisections, tolerance):  # type: ignore[no-untyped-def]
+    """Bisect tetrahedra until none is nearer to a front than its size and share allow.
+
+    They are halved across the middle of their longest edge; of equally long ones that counts whose
+    middle is nearest to a front.
+
+    Parameters
+    ----------
+    bary : (k, 4, 4) array
+        Vertices in some barycentric coordinates.
+    x : (k, 4, 3) array, length
+        Vertices.
+    levels : (k, t, 4, 2) array, length
+        Level sets of each front at the vertices, linear in between.
+    share : (k,) array
+        Of the volume of what these coordinates belong to.
+    nearness : float
+        Parts nearer than this times the fourth root of their share times their longest edge are
+        cut.
+    n_bisections : int
+        Most of them.
+    tolerance : float
+        Relative difference below which lengths are equal.
+
+    Returns
+    -------
+    number : (q,) array of int
+        Tetrahedron of each part, increasing.
+    bary : (q, 4, 4) array
+    share : (q,) array
+    """
+    n_fronts = levels.shape[1]
+    part_bary, part_x = np.empty((n_bisections + 1, 4, 4)), np.empty((n_bisections + 1, 4, 3))
+    part_levels, depth = (
+        np.empty((n_bisections + 1, n_fronts, 4, 2)),
+        np.empty(n_bisections + 1, np.int64),
+    )
+    number, count = np.empty(4 * len(share) + 16, np.int64), 0
+    result, fraction = np.empty((len(number), 4, 4)), np.empty(len(number))
+    length = np.empty(6)
+    for k in range(len(share)):
+        part_bary[0], part_x[0], part_levels[0], depth[0] = bary[k], x[k], levels[k], 0
+        top = 0
+        while top >= 0:
+            volume = share[k] * 0.5 ** depth[top]
+            r_min = np.inf
+            for i in range(4):
+                r_min = min(r_min, _least_radius(part_levels[top], i, i))
+            longest_edge, e = 0.0, 0
+            for i in range(3):
+                for j in range(i + 1, 4):
+                    square = 0.0
+                    for a in range(3):
+                        square += (part_x[top, i, a] - part_x[top, j, a]) ** 2
+                    length[e] = math.sqrt(square)
+                    longest_edge = max(longest_edge, length[e])
+                    e += 1
+            if (
+                depth[top] == n_bisections
+                or r_min >= nearness * math.sqrt(math.sqrt(volume)) * longest_edge
+            ):
+                if count == len(number):
+                    number = np.concatenate((number, np.empty_like(number)))
+                    result = np.concatenate((result, np.empty_like(result)))
+                    fraction = np.concatenate((fraction, np.empty_like(fraction)))
+                number[count], result[count], fraction[count] = k, part_bary[top], volume
+                count += 1
+                top -= 1
+                continue
+            first, last, nearest, e = 0, 1, np.inf, 0
+            for i in range(3):
+                for j in range(i + 1, 4):
+                    if length[e] >= (1.0 - tolerance) * longest_edge:
+                        r = math.floor(
+                            1e7 * _least_radius(part_levels[top], i, j) / longest_edge + 0.5
+                        )
+                        if r < nearest:
+                            first, last, nearest = i, j, r
+                    e += 1
+            part_bary[top + 1], part_x[top + 1] = part_bary[top], part_x[top]
+            part_levels[top + 1] = part_levels[top]
+            for a in range(4):
+                middle = 0.5 * (part_bary[top, first, a] + part_bary[top, last, a])
+                part_bary[top + 1, first, a] = part_bary[top, last, a] = middle
+            for a in range(3):
+                middle = 0.5 * (part_x[top, first, a] + part_x[top, last, a])
+                part_x[top + 1, first, a] = part_x[top, last, a] = middle
+            for t in range(n_fronts):
+                for a in range(2):
+                    middle = 0.5 * (part_levels[top, t, first, a] + part_levels[top, t, last, a])
+                    part_levels[top + 1, t, first, a] = part_levels[top, t, last, a] = middle
+            depth[top] += 1
+            depth[top + 1] = depth[top]
+            top += 1
+    return number[:count], result[:count], fraction[:count]
