@@ -87,6 +87,20 @@ def test_beyond_its_ends_a_front_is_straight():
     np.testing.assert_allclose(on, x + (past * turn[:, 3])[:, None] * frame[:, 2], atol=1e-12)
 
 
+@pytest.mark.parametrize("beyond", [0.1, 0.5, 2.0])
+def test_feet_of_points_far_beyond_an_end(beyond):
+    """A short front has domains that reach beyond its ends by more than its length."""
+    curve = helix(30)
+    end = np.array([curve.length])
+    x, frame, turn = curve.at(end)
+    away = beyond * curve.length
+    point = x + 0.1 * curve.length * frame[:, 1] + away * frame[:, 2]
+    feet = curve.feet(point)
+    np.testing.assert_allclose((feet.s - end) * turn[:, 3], away, rtol=1e-9)
+    ways = point - curve.at(feet.s)[0]
+    np.testing.assert_allclose(ways @ frame[0, 2], 0, atol=1e-12 * curve.length)  # round-off
+
+
 def test_arc_length_between_vertices():
     curve = ellipse_front(1.0, 0.5, 200, seed=5)
     s = np.sort(np.random.default_rng(61).uniform(0, curve.length, 30))

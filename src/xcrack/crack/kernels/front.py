@@ -113,7 +113,7 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
     start : (q,) array
         First guesses of the parameter.
     reach : float
-        Longest step of an iteration, in the parameter.
+        Longest step of an iteration along the front, in the parameter.
     break_arcs : (m + 1,) array
     place, normal : (4, m, 3) arrays
         Spline coefficients of the points and of the normals.
@@ -151,7 +151,8 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
             df = square - df
             is_newton = df > 0.1 * square
             step = f / (df if is_newton else square)
-            step = min(max(step, -reach), reach)
+            if is_closed or first <= u <= last:  # straight beyond its ends: any step is right
+                step = min(max(step, -reach), reach)
             previous_u = u
             u += step
             if is_closed:
