@@ -26,8 +26,12 @@ def label(path: Path) -> str:
     return path.relative_to(SOURCE).as_posix()
 
 
-def test_import_loads_nothing_heavy() -> None:
-    code = f"import sys, xcrack; print([name for name in {HEAVY} if name in sys.modules])"
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [("xcrack", HEAVY), ("xcrack.Problem", (*HEAVY, "scipy.interpolate", "scipy.optimize"))],
+)
+def test_import_loads_nothing_heavy(code: str, heavy: tuple[str, ...]) -> None:
+    code = f"import sys, xcrack; {code}; print([name for name in {heavy} if name in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stderr
     assert run.stdout.strip() == "[]"

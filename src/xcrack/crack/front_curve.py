@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
@@ -232,6 +231,8 @@ def front_curve(x: Floats, frame: Floats, is_closed: bool) -> FrontCurve:
     >>> curve.length
     2.0
     """
+    from scipy.interpolate import CubicSpline  # a sixth of what a Problem imports
+
     x, normal = np.asarray(x, dtype=float), np.asarray(frame, dtype=float)[:, 1]
     b = np.asarray(frame, dtype=float)[:, 2]
     if is_closed and len(x) > 1 and np.allclose(x[0], x[-1], atol=1e-12 * np.ptp(x)):

@@ -9,7 +9,6 @@ from itertools import permutations
 from math import factorial
 
 import numpy as np
-from scipy.special import roots_jacobi
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import ProblemError
@@ -75,6 +74,8 @@ def conical_rule(dim: int, n: int) -> tuple[Floats, Floats]:
 
     Stroud (1971), Approximate Calculation of Multiple Integrals, conical products.
     """
+    from scipy.special import roots_jacobi
+
     bary = np.ones((1, 1))
     weight = np.ones(1)
     for k in range(1, dim + 1):
