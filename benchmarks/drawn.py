@@ -246,7 +246,18 @@ def meetings(stored: Stored) -> str:
 def range_of_seeds(rows: dict[str, Row]) -> str:
     """Which seeds there are, in words; nothing where there are none."""
     seeds = sorted(int(seed) for seed in rows)
-    return f" (seeds {seeds[0]} to {seeds[-1]})" if seeds else ""
+    drawn = set(seeds)
+    begins = [seed for seed in seeds if seed - 1 not in drawn]
+    ends = [seed for seed in seeds if seed + 1 not in drawn]
+    runs = ", ".join(f"{begin} to {end}" for begin, end in zip(begins, ends, strict=True))
+    return f" (seeds {runs})" if seeds else ""
+
+
+def fault_of(row: Row) -> str:
+    """What is wrong with a scene that gave what none may give, in words."""
+    if row["seconds"] > SECONDS:
+        return f"{row['seconds']:.0f} s"
+    return str(row.get("words", "nan"))
 
 
 def worst(stored: Stored, n: int = 10) -> list[tuple[str, int, Row]]:
@@ -262,7 +273,7 @@ def page(stored: Stored) -> str:
     complete = all(drawn[where] >= WANTED[where] for where in ("plane", "space"))
     seeds = {where: range_of_seeds(stored.get(where, {})) for where in ("plane", "space")}
     faults = [
-        (w, seed, row.get("words", "nan")) for w, rows in stored.items()
+        (w, seed, fault_of(row)) for w, rows in stored.items()
         for seed, row in rows.items() if is_fault(row)
     ]  # fmt: skip
     fault_lines = "\n".join(f"* {w}, seed {s}: {t}" for w, s, t in faults) or "None."

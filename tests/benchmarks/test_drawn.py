@@ -41,12 +41,21 @@ def test_the_page_tells_what_must_not_be():
             "1": {"raised": "IndexError", "words": "index # is out of bounds", "seconds": 0.1},
             "2": {"raised": "ProblemError", "words": "refine the mesh", "seconds": 0.1},
             "3": {**good, "nan without a reason": 1},
+            "6": {**good, "seconds": 130.0},
         },
         "space": {},
     }
-    assert [drawn.is_fault(row) for row in rows["plane"].values()] == [False, True, False, True]
+    assert [drawn.is_fault(row) for row in rows["plane"].values()] == [
+        False,
+        True,
+        False,
+        True,
+        True,
+    ]
     text = drawn.page(rows)
     assert "* plane, seed 1: index # is out of bounds" in text
+    assert "* plane, seed 6: 130 s" in text
+    assert "5 of 8 500 scenes in the plane (seeds 0 to 3, 6 to 6) and" in text
     assert "| plane | 1 | 0.0 % (0 of 1) | – |" in text
     assert "75.0 % (3 of 4)" in text
     assert "| plane, 0 | inner | 7 | 2.0e-01 |" in text
