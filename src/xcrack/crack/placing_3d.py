@@ -534,7 +534,7 @@ def _check_inside(crack: Crack, body: Body) -> None:
     tree, reach = triangle_tree(crack.points, crack.faces), 1.001 * float(mesh.cell_size.max())
     on_boundary = np.zeros((0, 3))
     # A body of one cell across has points on its boundary only.
-    for x in (mesh.points, mesh.points[mesh.cells].mean(axis=1)):
+    for x in (mesh.points, mesh.cell_middles):
         nearest_point = closest_in(tree, x, reach)
         foot = nearest_point.foot[nearest_point.triangle >= 0]
         if len(foot):

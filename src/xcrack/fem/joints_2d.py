@@ -70,7 +70,7 @@ def _joined_pair(
     mesh: Mesh, through_cut: Cut, ending: Cut, junction: Junction
 ) -> tuple[Cut, Cut, Joint]:
     """Cuts of the crack that runs through and of the one that ends on it."""
-    centre = mesh.points[mesh.cells].mean(axis=1)
+    centre = mesh.cell_middles
     junction = replace(junction, reach=_joint_radius(mesh, through_cut, ending, junction))
     is_near = np.linalg.norm(centre - junction.x, axis=1) < junction.reach
     split = _split_cut(mesh, through_cut, ending, junction, is_near)

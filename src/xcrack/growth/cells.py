@@ -207,7 +207,7 @@ def _cells_2d(cells: CellSizes | None, indicators: Indicators, target: float) ->
     """Sizes at the tips and at other cells that contribute much to the bars."""
     mesh, tips = indicators.problem.mesh, indicators.problem.stations.x
     ratio = cell_ratios(indicators, target, _AIM)
-    centre, target_size = mesh.points[mesh.cells].mean(axis=1), ratio * mesh.cell_size
+    centre, target_size = mesh.cell_middles, ratio * mesh.cell_size
     is_smaller = ratio < _SMALLER
     size = cell_sizes(mesh, tips)
     distance = np.linalg.norm(centre[:, None] - tips, axis=2)

@@ -60,7 +60,7 @@ def tree(mesh: Mesh, order: int) -> Tree:
     """
     from xcrack.linalg.kernels.multifrontal import bisect_cells, node_parts, postorder
 
-    centre = mesh.points[mesh.cells].mean(axis=1)
+    centre = mesh.cell_middles
     depth = max(0, int(np.ceil(np.log2(len(mesh.cells) / _LEAF))))
     ranking = np.stack([np.argsort(x, kind="stable") for x in centre.T])
     leaf = bisect_cells(ranking, centre, mesh.cells, mesh.n_points, depth)

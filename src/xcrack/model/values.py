@@ -19,7 +19,7 @@ from xcrack.base.units import NUMBER
 class VectorField(Rule):
     """A vector, or a function f(x) or f(x, normal) of points.
 
-    With `free` an entry may be None, or a function f(x) of its own.
+    Where it `may_be_free` an entry may be None, or a function f(x) of its own.
     """
 
     unit: Unit = NUMBER

@@ -39,7 +39,7 @@ GRADED = [  # E at x = 1 over that at 0, tip, K_I
 
 def with_halves(mesh: Mesh, axis: int = 0, where: float = 0.5) -> Mesh:
     """The mesh with the sets "one" below a plane and "two" above it."""
-    middle = mesh.points[mesh.cells].mean(axis=1)[:, axis]
+    middle = mesh.cell_middles[:, axis]
     sets = {"one": np.nonzero(middle < where)[0], "two": np.nonzero(middle > where)[0]}
     facets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
     return Mesh(mesh.points, mesh.cells, facets, sets)
@@ -100,7 +100,7 @@ def strip(n: int, material: Any, sets: Any = None, **choices: Any) -> Problem:
     mesh = box((-9.0, -1.0), (9.0, 1.0), (18 * n, 2 * n + 1))  # what ends do falls by 4 in 1
     if sets is not None:
         facets = {name: f for name, f in mesh.facet_sets.items() if name != "boundary"}
-        mesh = Mesh(mesh.points, mesh.cells, facets, sets(mesh.points[mesh.cells].mean(axis=1)))
+        mesh = Mesh(mesh.points, mesh.cells, facets, sets(mesh.cell_middles))
     pulls = [displacement("top", (0.0, 0.5)), displacement("bottom", (0.0, -0.5))]
     crack = line_crack([(-11.0, 0.0), (0.0123, 0.0)])
     return Problem(mesh, material, [crack], pulls, **choices)
