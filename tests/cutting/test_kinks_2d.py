@@ -149,7 +149,7 @@ def test_tip_functions_go_on_beyond_pi():
         inner = np.concatenate([(centre + 2 * cut.sub_bary[:, v]) / 3 for v in range(3)])
         cell, side = np.tile(cell, 3), np.tile(cut.sub_side, 3)
         phi = np.einsum("qb,qb->q", inner, cut.level_set.phi[mesh.cells[cell]])
-        psi = np.einsum("qb,qb->q", inner, cut.level_set.inside[mesh.cells[cell]])
+        psi = np.einsum("qb,qb->q", inner, cut.level_set.psi_of_ends[mesh.cells[cell]])
         beyond = (phi * side < -1e-3 * np.abs(psi)) & (psi < 0) & cut.is_cut[cell]
         for batch, number, row in space.batches_of_points(cell[beyond]):
             if not batch.tips:

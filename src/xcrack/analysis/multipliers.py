@@ -380,7 +380,7 @@ def _groups(
         if i is not None and j is not None:
             parent[root(i)] = root(j)
     on_crack = cut.level_set.phi[nodes] == 0
-    is_inside = cut.level_set.inside[nodes] < 0
+    is_inside = cut.level_set.psi_of_ends[nodes] < 0
     # Nodes on the crack carry a group of their own, unless the tip lies on them, or they lie
     # beyond a junction.
     is_free_node = on_crack & is_inside & ~is_covered & (space.node_side[c][nodes] != 0)

@@ -37,7 +37,7 @@ class FootPoints:
     frame: Floats
     turn: Floats
 
-    def chosen(self, selection: Bools | Ints) -> "FootPoints":
+    def subset(self, selection: Bools | Ints) -> "FootPoints":
         """Some of the points, by a mask or by their numbers."""
         return FootPoints(
             self.s[selection], self.local[selection], self.frame[selection], self.turn[selection]
@@ -157,7 +157,7 @@ class FrontCurve:
         is_on_front = ~(
             (self.is_cut[0] & (points.s < 0)) | (self.is_cut[1] & (points.s > self.length))
         )
-        return rows[is_on_front], points.chosen(is_on_front)
+        return rows[is_on_front], points.subset(is_on_front)
 
     def distance(self, x: Floats, bound: float = np.inf) -> Floats:
         """Distance of points to the samples of the front `(q,)`; inf beyond a bound, length.

@@ -101,11 +101,11 @@ def _facet_points(space: FunctionSpace, cells: Ints) -> _Part:
     # Of each facet of each cell: its corners among those of the cell, and its outward normal.
     corners = mesh.dim + 1
     is_end = np.repeat(mesh.cells[cells], corners, axis=0)[:, :, None] == ends[inverse][:, None, :]
-    local = is_end.argmax(axis=1)
+    corner_in_cell = is_end.argmax(axis=1)
     inward_normal = mesh.gradient[cells].reshape(-1, mesh.dim)
     outward_normal = -inward_normal / np.linalg.norm(inward_normal, axis=1, keepdims=True)
     bary = np.zeros((len(owner), corners))
-    bary[np.arange(len(owner))[:, None], local[owner]] = at[point]
+    bary[np.arange(len(owner))[:, None], corner_in_cell[owner]] = at[point]
     normal = outward_normal[owner] * weight[point, None]
     cell = cells[owner // corners]
     side = cell_side(space, cell)
@@ -168,20 +168,20 @@ def corrected_gradients(
     parts = n_parts(space)
     piece = parts * row + part_numbers(space, batch.cells[row], side)
 
-    chosen, brow = _of_batch(batch, boundary.cell)
-    bary_, bside = boundary.bary[chosen], boundary.side[chosen]
+    boundary_rows, brow = _of_batch(batch, boundary.cell)
+    bary_, bside = boundary.bary[boundary_rows], boundary.side[boundary_rows]
     bpiece = parts * brow + part_numbers(space, batch.cells[brow], bside)
     n_pieces = parts * len(batch.cells)
-    inner = bary_
+    inner_bary = bary_
     if _has_crosses(space):
-        inner = _moved_inward(bary_, bpiece, bary, weight, piece, n_pieces)
-    bvalues = space.tip_values(batch, brow, inner, bside)
+        inner_bary = _moved_inward(bary_, bpiece, bary, weight, piece, n_pieces)
+    bvalues = space.tip_values(batch, brow, inner_bary, bside)
 
     moments = moments_at(row, bary, corners, is_linear)
     bmoments = moments_at(brow, bary_, corners, is_linear)
     count = moments.shape[1]
     defect, gram = np.zeros((n_pieces, n_tip, d, count)), np.zeros((n_pieces, count, count))
-    add_flux(defect, bpiece, bvalues, boundary.normal[chosen], bmoments)
+    add_flux(defect, bpiece, bvalues, boundary.normal[boundary_rows], bmoments)
     take_volume(
         defect, gram, piece, weight, values[:, first:], gradients[:, first:], moments, 1 / size[row]
     )
@@ -220,8 +220,8 @@ def _moved_inward(
 
 def _of_batch(batch: Batch, cell: Ints) -> tuple[Ints, Ints]:
     place = np.minimum(batch.cells.searchsorted(cell), len(batch.cells) - 1)
-    chosen = (batch.cells[place] == cell).nonzero()[0]
-    return chosen, place[chosen]
+    rows = (batch.cells[place] == cell).nonzero()[0]
+    return rows, place[rows]
 
 
 # Points in cells together with the functions that act there, for sums over several columns.
@@ -264,8 +264,8 @@ def tabulate_functions(space: FunctionSpace, points: Points) -> Tabulated:
     """
     batches = []
     for batch, number, row in space.batches_of_points(points.cell):
-        where = points.bary[number], points.side[number]
-        _, slope = space.tabulate(batch, row, *where, values=False)
+        bary_and_side = points.bary[number], points.side[number]
+        _, slope = space.tabulate(batch, row, *bary_and_side, values=False)
         batches.append((batch, number, row, slope))
     return Tabulated(points, tuple(batches))
 
@@ -388,10 +388,10 @@ def with_one_jump(space: FunctionSpace, cells: Ints) -> Bools:
     Without those around junctions, where they depend on a second crack.
     """
     mask = space.signature[cells]
-    one = (mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts))
+    has_one_jump = (mask & (mask - 1) == 0) & (mask < 1 << len(space.cuts))
     for joint in space.joints:
-        one &= ~joint.is_near[cells]
-    return np.asarray(one)
+        has_one_jump &= ~joint.is_near[cells]
+    return np.asarray(has_one_jump)
 
 
 def reused_cells(
@@ -432,8 +432,8 @@ def reused_cells(
     weight = elasticity.weights(points.cell, points.bary, points.weight)
     for batch, rows in space.batches(cells[new_rows]):
         number, place, first = points.of_cells(batch.cells)
-        where = points.bary[number], points.side[number]
-        _, G = space.tabulate(batch, place, *where, values=False)
+        bary_and_side = points.bary[number], points.side[number]
+        _, G = space.tabulate(batch, place, *bary_and_side, values=False)
         products[new_rows[rows]] = gradient_products(first, weight[number], G, n)
     return ReusedCells(cells, key, products), len(points.weight)
 

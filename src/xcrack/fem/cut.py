@@ -62,7 +62,7 @@ def _cut_points(
         bary[row[~vertex], k, i] = b / (b - a)
         bary[row[~vertex], k, j] = a / (a - b)
         number[row[~vertex], k] = edge[row[~vertex], e]
-    psi_at_vertices = level_set.inside[mesh.cells[cells]]
+    psi_at_vertices = level_set.psi_of_ends[mesh.cells[cells]]
     psi = np.einsum("cvb,cb->cv", bary, psi_at_vertices)
     return CutEnds(bary, psi, number)
 
@@ -105,8 +105,8 @@ def _tip_cells(
             middle = phi[i] @ (p + q)
             owner.append(cell)
             bary.append([apex[i], p, q])
-            largest = phi[i, np.argmax(np.abs(phi[i]))]
-            side.append(1 if (middle if middle != 0 else largest) >= 0 else -1)
+            largest_phi = phi[i, np.argmax(np.abs(phi[i]))]
+            side.append(1 if (middle if middle != 0 else largest_phi) >= 0 else -1)
         if is_crossed[i]:
             e = row_of[i]
             psi = level_set.psi[k][mesh.cells[cell]] @ ends.bary[e].T
@@ -176,7 +176,7 @@ def corner_places(mesh: Mesh, level_set: LevelSet, cells: Ints) -> Floats:
     if mesh.dim == 2:  # rules on triangles are symmetric enough: their order may decide
         return np.zeros((0, 3, 1))
     nodes = mesh.cells[cells]
-    values = np.stack([level_set.phi, level_set.inside], axis=1)
+    values = np.stack([level_set.phi, level_set.psi_of_ends], axis=1)
     return np.concatenate([mesh.points[nodes], values[nodes]], axis=2)
 
 
@@ -196,23 +196,23 @@ def _front_subs(
     whole_cells, split = np.nonzero(~is_crossed)[0], np.nonzero(is_crossed)[0]
     corners = corner_places(mesh, level_set, cells)
     bary, share, side, parent = cut_simplices(phi[split], corners[split])
-    largest = np.take_along_axis(phi, np.abs(phi).argmax(axis=1)[:, None], 1)[:, 0]
+    largest_phi = np.take_along_axis(phi, np.abs(phi).argmax(axis=1)[:, None], 1)[:, 0]
     owner = np.concatenate([whole_cells, split[parent]])
     bary = np.concatenate([np.broadcast_to(np.eye(4), (len(whole_cells), 4, 4)), bary])
     share = np.concatenate([np.ones(len(whole_cells)), share])
-    side = np.concatenate([np.where(largest[whole_cells] >= 0, 1, -1), side])
+    side = np.concatenate([np.where(largest_phi[whole_cells] >= 0, 1, -1), side])
     for psi in level_set.psi:
         values = psi[mesh.cells[cells]]
         owner, bary, share, side = _cut_again(values, corners, owner, bary, share, side)
     lip, row = interface_simplices(phi[split], corners[split])
     lip_owner = split[row]
-    psi_at_lips = np.einsum("svb,sb->sv", lip, level_set.inside[mesh.cells[cells[lip_owner]]])
+    psi_at_lips = np.einsum("svb,sb->sv", lip, level_set.psi_of_ends[mesh.cells[cells[lip_owner]]])
     part, row = parts_behind(psi_at_lips, np.einsum("svb,sbd->svd", lip, corners[lip_owner]))
     lips = np.einsum("svw,swb->svb", part, lip[row])
     edges = np.unique(mesh.cell_to_edge[cells])
     t = positions[edges]
     a, b = mesh.edges[edges].T
-    at = (1 - t) * level_set.inside[a] + t * level_set.inside[b]
+    at = (1 - t) * level_set.psi_of_ends[a] + t * level_set.psi_of_ends[b]
     size = np.linalg.norm(mesh.points[a] - mesh.points[b], axis=1)
     with np.errstate(invalid="ignore"):
         entry = edges[(at < -_AT * size) & level_set.is_near[edges]]
@@ -227,14 +227,14 @@ def _cut_again(
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
     whole_cells, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
     x = np.einsum("svb,sbd->svd", bary[rows], corners[owner[rows]])
-    inner, part, _, parent = cut_simplices(values[rows], x)
+    bary_in_sub, part, _, parent = cut_simplices(values[rows], x)
     source = rows[parent]
-    bary_of_parts = np.einsum("svw,swb->svb", inner, bary[source])
-    every = np.concatenate([whole_cells, source])
+    bary_of_parts = np.einsum("svw,swb->svb", bary_in_sub, bary[source])
+    source_rows = np.concatenate([whole_cells, source])
     result = np.concatenate([share[whole_cells], share[source] * part])
     keep = result > _NOTHING
     vertices = np.concatenate([bary[whole_cells], bary_of_parts])
-    return owner[every][keep], vertices[keep], result[keep], side[every][keep]
+    return owner[source_rows][keep], vertices[keep], result[keep], side[source_rows][keep]
 
 
 def lips_up_to_fronts(
@@ -258,10 +258,10 @@ def parts_behind(psi: Floats, x: Floats | None = None) -> tuple[Floats, Ints]:
     cut = (values.min(axis=1) < 0) & (values.max(axis=1) > 0)
     whole_cells = np.nonzero(~cut & (values.min(axis=1) < 0))[0]
     rows = np.nonzero(cut)[0]
-    inner, _, side, parent = cut_simplices(values[rows], None if x is None else x[rows])
+    bary_in_triangle, _, side, parent = cut_simplices(values[rows], None if x is None else x[rows])
     is_behind = side < 0
     corner = np.broadcast_to(np.eye(3), (len(whole_cells), 3, 3))
-    return np.concatenate([corner, inner[is_behind]]), np.concatenate(
+    return np.concatenate([corner, bary_in_triangle[is_behind]]), np.concatenate(
         [whole_cells, rows[parent[is_behind]]]
     )
 
@@ -406,15 +406,15 @@ def cut(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> Cut:
     phi = level_set.phi
     values = phi[mesh.cells]
     columns = np.ascontiguousarray(values.T)  # minima of few values are quick along the first axis
-    low = columns.min(axis=0)
-    is_crossed = (low < 0) & (columns.max(axis=0) > 0)
+    phi_min = columns.min(axis=0)
+    is_crossed = (phi_min < 0) & (columns.max(axis=0) > 0)
     positions, has_position = _edge_positions(mesh, phi)
     is_tip = np.zeros(len(mesh.cells), dtype=bool)
     for cells in level_set.tip_cells:
         is_tip[cells] = True
     candidates = np.nonzero(is_crossed & ~is_tip)[0]
     lip, owner = interface_simplices(values[candidates], corner_places(mesh, level_set, candidates))
-    psi = np.einsum("svb,sb->s", lip, level_set.inside[mesh.cells[candidates[owner]]])
+    psi = np.einsum("svb,sb->s", lip, level_set.psi_of_ends[mesh.cells[candidates[owner]]])
     sign_change = has_position[mesh.cell_to_edge[candidates]]
     is_close = (level_set.is_near[mesh.cell_to_edge[candidates]] | ~sign_change).all(axis=1)
     is_through = is_close & (np.bincount(owner, psi, len(candidates)) < 0)
@@ -452,7 +452,7 @@ def cut(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> Cut:
         lip_bary=lock(lip_bary),
         lip_normal=lock(_lip_normals(mesh, phi, lip_cell, lip_bary, geometry)),
         cut_edge=lock(np.where(edge_flag & has_position, positions, np.nan)),
-        side=lock(np.where(is_crossed, 0, np.where(low >= 0, 1, -1))),
+        side=lock(np.where(is_crossed, 0, np.where(phi_min >= 0, 1, -1))),
         kinks=kinks,
     )
 
@@ -487,8 +487,8 @@ def _inner_lips(cell: Ints, bary: Floats) -> _Lips:
 
 
 def _cell_sides(values: Floats) -> Ints:
-    largest = np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], 1)[:, 0]
-    return np.where(largest >= 0, 1, -1).astype(np.int64)
+    largest_value = np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], 1)[:, 0]
+    return np.where(largest_value >= 0, 1, -1).astype(np.int64)
 
 
 def _edge_positions(mesh: Mesh, phi: Floats) -> tuple[Floats, Bools]:
@@ -511,7 +511,7 @@ def _facet_lips(mesh: Mesh, level_set: LevelSet, geometry: CellGeometry) -> _Lip
         return no_lips
     cells = mesh.facet_to_cell[facets]
     side = _cell_sides(level_set.phi[mesh.cells[cells.ravel()]]).reshape(-1, 2)
-    psi = level_set.inside[mesh.facets[facets]]
+    psi = level_set.psi_of_ends[mesh.facets[facets]]
     keep = (psi.min(axis=1) < 0) & (side[:, 0] != side[:, 1])
     facets, cells, side, psi = facets[keep], cells[keep], side[keep], psi[keep]
     if not len(facets):

@@ -37,14 +37,14 @@ def disc_radii(
     demands. Never below two cells.
     """
     tips = [tip_frames(crack)[0] for crack in cracks]
-    every = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
+    all_tips = np.concatenate(tips) if tips else np.zeros((0, mesh.dim))
     radii = []
     for crack, cut, tips_of_crack in zip(cracks, cuts, tips, strict=True):
         length = crack_length(crack) / max(len(tips_of_crack), 1)
         row = []
         for k, x in enumerate(tips_of_crack):
             to_boundary, _ = nearest_boundary(mesh, x)
-            distance = np.linalg.norm(every - x, axis=1)
+            distance = np.linalg.norm(all_tips - x, axis=1)
             to_tip = float(np.min(distance[distance > 0], initial=np.inf))
             to_joint = float(np.linalg.norm(meeting - x, axis=1).min(initial=np.inf))
             size = leg_size(mesh, cut.level_set.tip_cells[k])
@@ -78,8 +78,8 @@ def front_reach(mesh: Mesh, crack: Crack, radius: float | None) -> float:
     fronts = [crack.points[front] for front in crack.fronts or ()]
     if not fronts:
         return 0.0
-    nearest = mesh.cell_tree.query(np.concatenate(fronts))[1]
-    size = float(mesh.cell_size[nearest].max())
+    nearest_cells = mesh.cell_tree.query(np.concatenate(fronts))[1]
+    size = float(mesh.cell_size[nearest_cells].max())
     return max(radius or 0.0, _RANGE[1][1] * size) + size
 
 
@@ -123,8 +123,8 @@ def front_radii(
     """
     del meeting
     least_cells, most_cells = _RANGE[order]
-    every = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
-    if not any(every):
+    fronts_of_cracks = [[crack.points[front] for front in crack.fronts or ()] for crack in cracks]
+    if not any(fronts_of_cracks):
         return [() for _ in cracks]
     body, radii = Body.of(mesh), []
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
@@ -135,16 +135,16 @@ def front_radii(
         for k, numbers in enumerate(fronts):
             cell = leg_size(mesh, cut.level_set.tip_cells[k])
             is_closed = bool(numbers[0] == numbers[-1])
-            room = _ASIDE * _to_sides(body, every[c][k], is_closed)
+            room = _ASIDE * _to_sides(body, fronts_of_cracks[c][k], is_closed)
             other_fronts = [
                 x
-                for d, fronts_of_crack in enumerate(every)
+                for d, fronts_of_crack in enumerate(fronts_of_cracks)
                 for j, x in enumerate(fronts_of_crack)
                 if (d, j) != (c, k) and not are_opposite(cracks[d], crack)
             ]
             if other_fronts:
-                nearest = cKDTree(np.concatenate(other_fronts)).query(every[c][k])[0]
-                room = min(room, _APART * float(nearest.min()))
+                distance = cKDTree(np.concatenate(other_fronts)).query(fronts_of_cracks[c][k])[0]
+                room = min(room, _APART * float(distance.min()))
             if radius is None:
                 share_of_size = min(_SHARE_OF_FRONT * (2 if is_closed else 1) * size, room)
                 row.append(max(min(share_of_size, most_cells * cell), least_cells * cell))
@@ -188,9 +188,9 @@ def heaviside_nodes(mesh: Mesh, order: int, cut: Cut) -> Bools:
     flag[nodes[cut.cells]] = True
     on_facets = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]
     if on_facets.any():
-        one, other = mesh.cells[np.unique(cut.lip_cell[on_facets], axis=0)].transpose(1, 0, 2)
-        is_shared = (one[:, :, None] == other[:, None, :]).any(axis=2)
-        facets = one[is_shared].reshape(-1, mesh.dim)
+        v, v_beyond = mesh.cells[np.unique(cut.lip_cell[on_facets], axis=0)].transpose(1, 0, 2)
+        is_shared = (v[:, :, None] == v_beyond[:, None, :]).any(axis=2)
+        facets = v[is_shared].reshape(-1, mesh.dim)
         flag[facet_nodes(mesh, order, facets)] = True
     for cells in cut.level_set.tip_cells:
         flag[nodes[cells]] = False
@@ -241,9 +241,9 @@ def divided_points(mesh: Mesh, crack: Crack, cut: Cut, flags: list[Bools]) -> li
     result = list(flags)
     phi, psi = cut.level_set.phi, cut.level_set.psi
     ends = [crack.points[front[[0, -1]]] for front in crack.fronts or ()]
-    for j, one in enumerate(ends):
-        for i, other in enumerate(ends[:j]):
-            gap = float(np.linalg.norm(one - other[::-1], axis=1).min())
+    for j, ends_of_j in enumerate(ends):
+        for i, ends_of_i in enumerate(ends[:j]):
+            gap = float(np.linalg.norm(ends_of_j - ends_of_i[::-1], axis=1).min())
             if gap < _RUNS_ON * leg_size(mesh, cut.level_set.tip_cells[j]):
                 common_points = result[i] & result[j]
                 is_nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])

@@ -125,14 +125,14 @@ def split_triangles(space: FunctionSpace, ends: Ints) -> FacetParts:
         touched_facets, at_front = _touched_facets(space, c)
         levels = [(cut.level_set.phi, touched_facets)]
         levels += [(psi, at_front) for psi in cut.level_set.psi]
-        for values, where in levels:
-            chosen = where[facet[number]]
+        for values, facet_mask in levels:
+            is_chosen = facet_mask[facet[number]]
             x = np.einsum("svb,sbd->svd", bary, space.mesh.points[ends[number]])
-            number, bary, side = _split_parts(number, bary, side, x, values[ends], chosen)
+            number, bary, side = _split_parts(number, bary, side, x, values[ends], is_chosen)
         at = np.einsum("svb,sb->sv", bary, cut.level_set.phi[ends[number]])
-        largest = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
+        largest_value = np.take_along_axis(at, np.abs(at).argmax(axis=1)[:, None], 1)[:, 0]
         changes = (at.min(axis=1) < 0) & (at.max(axis=1) > 0) & ~touched_facets[facet[number]]
-        side[:, c] = np.where(changes, 0, np.sign(largest))
+        side[:, c] = np.where(changes, 0, np.sign(largest_value))
     return FacetParts(number, bary, side)
 
 
@@ -148,17 +148,17 @@ def _touched_facets(space: FunctionSpace, c: int) -> tuple[Bools, Bools]:
 
 
 def _split_parts(
-    number: Ints, bary: Floats, side: Ints, x: Floats, values: Floats, chosen: Bools
+    number: Ints, bary: Floats, side: Ints, x: Floats, values: Floats, is_chosen: Bools
 ) -> tuple[Ints, Floats, Ints]:
     """Split those of the chosen parts x on which a function of the facet changes its sign."""
     at = np.einsum("svb,sb->sv", bary, values[number])
     tolerance = _AT * np.abs(values[number]).max(axis=1, keepdims=True)
     at = np.where(np.abs(at) < tolerance, 0.0, at)
-    cut = chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
+    cut = is_chosen & (at.min(axis=1) < 0) & (at.max(axis=1) > 0)
     whole_parts, rows = np.nonzero(~cut)[0], np.nonzero(cut)[0]
-    inner, _, _, parent = cut_simplices(at[rows], x[rows])
+    bary_in_part, _, _, parent = cut_simplices(at[rows], x[rows])
     source = np.concatenate([whole_parts, rows[parent]])
-    bary_of_parts = np.einsum("svw,swb->svb", inner, bary[rows[parent]])
+    bary_of_parts = np.einsum("svw,swb->svb", bary_in_part, bary[rows[parent]])
     return number[source], np.concatenate([bary[whole_parts], bary_of_parts]), side[source]
 
 
@@ -251,9 +251,9 @@ def arc_position(polyline: Floats, x: Floats) -> Floats:
     t = np.einsum("ksd,sd->ks", x[:, None] - a, segment) / length**2
     t = np.clip(t, 0.0, 1.0)
     foot = a + t[..., None] * segment
-    best = np.argmin(np.linalg.norm(x[:, None] - foot, axis=2), axis=1)
+    nearest_segment = np.argmin(np.linalg.norm(x[:, None] - foot, axis=2), axis=1)
     row = np.arange(len(x))
-    return start[best] + t[row, best] * length[best]
+    return start[nearest_segment] + t[row, nearest_segment] * length[nearest_segment]
 
 
 def jump_values(space: FunctionSpace, c: int, lips: LipPoints) -> list[tuple[Ints, Ints, Floats]]:
@@ -285,7 +285,7 @@ def jump_matrix(
     if lips.inside_cells:  # both lips have the same functions
         half = len(parts) // 2
         pairs = zip(parts[:half], parts[half:], strict=True)
-        parts = [(functions, number, N + other) for (functions, number, N), (*_, other) in pairs]
+        parts = [(functions, number, N + N_2) for (functions, number, N), (*_, N_2) in pairs]
     for functions, number, N in parts:
         is_active = (functions >= 0) & (N != 0)
         rows.append(np.broadcast_to(number[:, None], functions.shape)[is_active])

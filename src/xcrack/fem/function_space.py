@@ -196,11 +196,11 @@ class FunctionSpace:
     def _combinations(self) -> tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]:
         """What acts together on cells: the bit mask, and the cracks and tips in it."""
         n = len(self.cuts)
-        every = []
+        rows = []
         for value in np.unique(self.signature).tolist():
             bits = [b for b in range(n + len(self.tips)) if value >> b & 1]
-            every.append((value, [b for b in bits if b < n], [b - n for b in bits if b >= n]))
-        return tuple((value, tuple(cracks), tuple(tips)) for value, cracks, tips in every)
+            rows.append((value, [b for b in bits if b < n], [b - n for b in bits if b >= n]))
+        return tuple((value, tuple(cracks), tuple(tips)) for value, cracks, tips in rows)
 
     def batches_of_points(self, cell: Ints) -> list[tuple[Batch, Ints, Ints]]:
         """Batches that serve points in the given cells `(q,)`, in any order and repeated.
@@ -240,9 +240,9 @@ class FunctionSpace:
         for t in tips:
             tip = self.tips[t]
             first = tip.point_to_function[points][:, :, None]
-            every = first + (first >= 0) * np.arange(tip.functions)
+            tip_functions = first + (first >= 0) * np.arange(tip.functions)
             width = corners * tip.functions
-            functions[:, at : at + width] = every.reshape(-1, width)
+            functions[:, at : at + width] = tip_functions.reshape(-1, width)
             at += width
         return Batch(cells, cracks, tips, functions)
 
@@ -327,10 +327,10 @@ class FunctionSpace:
         for joint in self.joints:
             if joint.crack == tip.crack and self.dim == 3:
                 is_beyond = side[:, joint.on] == -joint.side
-                last = first + (self.dim + 1) * tip.functions
+                stop = first + (self.dim + 1) * tip.functions
                 for table in tables:
                     if len(table):
-                        table[is_beyond, first:last] = 0.0
+                        table[is_beyond, first:stop] = 0.0
 
     @cached_property
     def tip_shift(self) -> tuple[Floats, ...]:
@@ -352,15 +352,15 @@ def _with_any(flag: Bools, nodes: Ints) -> Ints:
     return np.asarray(result.nonzero()[0])
 
 
-def _bears_tip(mesh: Mesh, other: Cut, side: int) -> Bools:
+def _bears_tip(mesh: Mesh, through_cut: Cut, side: int) -> Bools:
     """Points that may carry tip functions of a crack that ends on another one in 3D `(n,)`.
 
     Those of cells with parts on its side; but where the other crack has ended nothing may jump
     across its level set.
     """
     flag = np.zeros(mesh.n_points, dtype=bool)
-    flag[mesh.cells[(other.side == side) | other.is_cut]] = True
-    flag[mesh.cells[(other.side == 0) & ~other.is_cut]] = False
+    flag[mesh.cells[(through_cut.side == side) | through_cut.is_cut]] = True
+    flag[mesh.cells[(through_cut.side == 0) & ~through_cut.is_cut]] = False
     return flag
 
 
@@ -380,9 +380,9 @@ def function_space(
     """
     for c, (crack, cut) in enumerate(zip(cracks, cuts, strict=True)):
         if not len(cut.lip_cell):
-            first, last = np.round(crack.points[[0, -1]], 6).tolist()
+            start, end = np.round(crack.points[[0, -1]], 6).tolist()
             raise GeometryError(
-                f"crack {c} from {first} to {last} cuts no cell: it runs along the boundary; move "
+                f"crack {c} from {start} to {end} cuts no cell: it runs along the boundary; move "
                 "it inside, or leave it out. If that is the symmetry plane of a half model, model "
                 "both halves."
             )

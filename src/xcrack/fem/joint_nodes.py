@@ -34,19 +34,19 @@ def jump_nodes(space: FunctionSpace) -> tuple[Bools, ...]:
     result = [number >= 0 for number in space.heaviside]
     for joint in space.joints:
         ending_cut, on = space.cuts[joint.crack], space.cuts[joint.on]
-        inner, is_beside = space.geometry.nodes_at_joint(space, joint)
-        cells = np.nonzero(inner[space.cell_nodes].any(axis=1))[0]
+        is_near, is_beside = space.geometry.nodes_at_joint(space, joint)
+        cells = np.nonzero(is_near[space.cell_nodes].any(axis=1))[0]
         subs = sub_cells(space, cells)
         # Ahead of a tip the level set changes its sign too, but cuts nothing.
         is_crossed = ending_cut.is_cut[subs.cell] | on.is_cut[subs.cell]
         if space.dim == 3:  # along the junction its own front may be near
-            psi_at_vertices = ending_cut.level_set.inside[space.mesh.cells]
+            psi_at_vertices = ending_cut.level_set.psi_of_ends[space.mesh.cells]
             is_ahead = np.asarray((psi_at_vertices >= 0).any(axis=1))
             is_crossed &= ending_cut.is_cut[subs.cell] | ~is_ahead[subs.cell]
         is_added = _parted_nodes(space, subs, joint.crack, is_crossed) & is_beside
-        is_added &= inner & ~_nodes_of(space, ending_cut.is_tip)
+        is_added &= is_near & ~_nodes_of(space, ending_cut.is_tip)
         is_parted = _parted_nodes(space, subs, joint.crack, np.ones(len(is_crossed), dtype=bool))
-        result[joint.crack] = is_added | (result[joint.crack] & (is_parted | ~inner))
+        result[joint.crack] = is_added | (result[joint.crack] & (is_parted | ~is_near))
     return tuple(result)
 
 
@@ -60,8 +60,8 @@ def nodes_around_point(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools
 def nodes_along_line(space: FunctionSpace, joint: Joint) -> tuple[Bools, Bools]:
     """Nodes in 3D next to cells that both cracks cut `(nodes,)`, twice."""
     nodes_of_both = _nodes_of(space, joint.is_in_both)
-    inner = _nodes_of(space, np.asarray(nodes_of_both[space.cell_nodes].any(axis=1)))
-    return inner, inner
+    is_near = _nodes_of(space, np.asarray(nodes_of_both[space.cell_nodes].any(axis=1)))
+    return is_near, is_near
 
 
 def _nodes_of(space: FunctionSpace, cells: Bools) -> Bools:
@@ -71,11 +71,11 @@ def _nodes_of(space: FunctionSpace, cells: Bools) -> Bools:
     return flag
 
 
-def _parted_nodes(space: FunctionSpace, subs: SubCells, c: int, chosen: Bools) -> Bools:
+def _parted_nodes(space: FunctionSpace, subs: SubCells, c: int, is_chosen: Bools) -> Bools:
     """Nodes with chosen sub-cells on both sides of crack c `(nodes,)`."""
     result = np.ones(space.n_nodes, dtype=bool)
     for side in (1, -1):
-        has_part = chosen & (subs.side[:, c] == side) & (subs.fraction > _NOTHING)
+        has_part = is_chosen & (subs.side[:, c] == side) & (subs.fraction > _NOTHING)
         flag = np.zeros(space.n_nodes, dtype=bool)
         flag[space.cell_nodes[subs.cell[has_part]]] = True
         result &= flag

@@ -129,13 +129,13 @@ def _crossing_shares(
     """
     at_kinks = np.nonzero(np.isin(cell, cut.kinks.cells))[0]
     result = np.array(share)
-    low, high = np.zeros(len(at_kinks)), np.ones(len(at_kinks))
+    t0, t1 = np.zeros(len(at_kinks)), np.ones(len(at_kinks))
     for _ in range(_HALVES if len(at_kinks) else 0):
-        middle = (low + high) / 2
+        middle = (t0 + t1) / 2
         at = _points_between(bary[at_kinks][:, None], middle)
         is_before = begin[at_kinks] * _level(mesh, cut, cell[at_kinks], at)[:, 0] > 0
-        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    result[at_kinks] = (low + high) / 2
+        t0, t1 = np.where(is_before, middle, t0), np.where(is_before, t1, middle)
+    result[at_kinks] = (t0 + t1) / 2
     return result
 
 
@@ -169,10 +169,10 @@ def _clipped_cut(
     begin, end = mesh.edges.T
     t = ending.cut_edge
     # At a kink the other crack cuts an edge elsewhere than where phi is zero.
-    other = through_cut.cut_edge
+    through_edge = through_cut.cut_edge
     with np.errstate(invalid="ignore"):
-        at_cut = np.where(t < other, phi[begin], phi[end])
-    at_cut = np.where(np.isnan(other), (1 - t) * phi[begin] + t * phi[end], at_cut) * side
+        at_cut = np.where(t < through_edge, phi[begin], phi[end])
+    at_cut = np.where(np.isnan(through_edge), (1 - t) * phi[begin] + t * phi[end], at_cut) * side
     is_close = (
         np.linalg.norm(mesh.points[mesh.edges].mean(axis=1) - junction.x, axis=1) < junction.reach
     )
@@ -207,12 +207,12 @@ def _split_cut(
     )[0]
     a, b = value[rows].T
     middle = _points_between(through_cut.lip_bary[rows], a / (a - b))
-    first, second = np.array(through_cut.lip_bary), np.array(through_cut.lip_bary[rows])
-    first[rows, :, 1] = middle
-    second[:, :, 0] = middle
+    lip_bary, split_bary = np.array(through_cut.lip_bary), np.array(through_cut.lip_bary[rows])
+    lip_bary[rows, :, 1] = middle
+    split_bary[:, :, 0] = middle
     return replace(
         through_cut,
         lip_cell=lock(np.concatenate([through_cut.lip_cell, through_cut.lip_cell[rows]])),
-        lip_bary=lock(np.concatenate([first, second])),
+        lip_bary=lock(np.concatenate([lip_bary, split_bary])),
         lip_normal=lock(np.concatenate([through_cut.lip_normal, through_cut.lip_normal[rows]])),
     )

@@ -47,11 +47,11 @@ def joined_cuts(
         result[junction.crack] = _clipped_cut(
             mesh, through_cut, ending, junction.side, is_gone, is_in_both
         )
-        every = np.ones(len(mesh.cells), dtype=bool)
+        all_cells = np.ones(len(mesh.cells), dtype=bool)
         joints.append(
             Joint(
                 junction.crack, junction.on, junction.side, lock(np.array(junction.x)),
-                lock(np.array(junction.x)), np.inf, lock(every), lock(is_in_both),
+                lock(np.array(junction.x)), np.inf, lock(all_cells), lock(is_in_both),
             )
         )  # fmt: skip
     return tuple(result), tuple(joints)
@@ -85,8 +85,8 @@ def _check(
             "front of the other only the first helps, or to end one of them a few cells before."
         )
     cells = np.nonzero(is_joined)[0]
-    one, other = (_slopes(mesh, cut, cells) for cut in (through_cut, ending))
-    sine = np.linalg.norm(np.cross(one, other), axis=1)
+    through_slope, ending_slope = (_slopes(mesh, cut, cells) for cut in (through_cut, ending))
+    sine = np.linalg.norm(np.cross(through_slope, ending_slope), axis=1)
     if sine.min() < _SINE:
         cell = int(cells[int(np.argmin(sine))])
         raise GeometryError(
@@ -103,7 +103,7 @@ def _check_clearance(mesh: Mesh, through_cut: Cut, ending: Cut, junction: Juncti
     """Raise where an arm at a small angle passes the front of the other crack too closely."""
     cells = np.nonzero(through_cut.is_tip)[0]
     distance = np.abs(ending.level_set.phi[mesh.cells[cells]].mean(axis=1))
-    level_inside = ending.level_set.inside[mesh.cells[cells]].mean(axis=1)
+    level_inside = ending.level_set.psi_of_ends[mesh.cells[cells]].mean(axis=1)
     close = (distance < _CLEAR * mesh.cell_size[cells]) & (level_inside < 0)
     if close.any():
         k = int(np.nonzero(close)[0][np.argmin(distance[close])])
@@ -126,8 +126,8 @@ def _beside_faces(mesh: Mesh, cut: Cut) -> Bools:
 def _on_faces(mesh: Mesh, cut: Cut) -> Bools:
     """Points of facets of the mesh on which a crack lies `(n,)`."""
     pairs = cut.lip_cell[cut.lip_cell[:, 0] != cut.lip_cell[:, 1]]
-    corner, other = mesh.cells[pairs].transpose(1, 0, 2)
-    is_shared = (corner[:, :, None] == other[:, None]).any(axis=2)
+    corner, corner_beyond = mesh.cells[pairs].transpose(1, 0, 2)
+    is_shared = (corner[:, :, None] == corner_beyond[:, None]).any(axis=2)
     on_faces = np.zeros(mesh.n_points, dtype=bool)
     on_faces[corner[is_shared]] = True
     return on_faces
@@ -158,8 +158,8 @@ def _at(mesh: Mesh, values: Floats, cell: Ints, bary: Floats) -> Floats:
 
 def _parts(value: Floats, bary: Floats, x: Floats) -> tuple[Floats, Ints, Ints]:
     """Triangles with values of both signs split: corners `(s, 2, 3, 4)`, sides and parents."""
-    inner, _, side, parent = cut_simplices(value, x)
-    return np.einsum("svw,stwb->stvb", inner, bary[parent]), side, parent
+    bary_in_triangle, _, side, parent = cut_simplices(value, x)
+    return np.einsum("svw,stwb->stvb", bary_in_triangle, bary[parent]), side, parent
 
 
 def _clipped_cut(
@@ -169,10 +169,10 @@ def _clipped_cut(
     phi = through_cut.level_set.phi
     cell = ending.lip_cell[:, 0]
     value = _at(mesh, phi, cell, ending.lip_bary[:, 0]) * side
-    low, high = value.min(axis=1), value.max(axis=1)
+    value_min, value_max = value.min(axis=1), value.max(axis=1)
     clips = is_in_both[cell]
-    keep = ~is_gone[cell] & (~clips | ((low >= 0) & (high > 0)))
-    rows = np.nonzero(clips & (low < 0) & (high > 0))[0]
+    keep = ~is_gone[cell] & (~clips | ((value_min >= 0) & (value_max > 0)))
+    rows = np.nonzero(clips & (value_min < 0) & (value_max > 0))[0]
     x = ending.lip_points(mesh)[rows]
     bary, part_side, parent = _parts(value[rows], ending.lip_bary[rows], x)
     is_before = part_side > 0

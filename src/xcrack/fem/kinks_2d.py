@@ -51,8 +51,8 @@ class Kinks:
         """A function like the level set, zero on the crack, at points `(q, 3)` of cells by row."""
         result = np.einsum("qb,qb->q", bary, self.values[row])
         for q in np.nonzero(~np.isnan(self.vertex[row, 0]))[0]:
-            lines, inner = _two_lines(self.values[row[q]], self.vertex[row[q]])
-            result[q] = inner * (inner * (lines @ bary[q])).min()
+            lines, sense = _two_lines(self.values[row[q]], self.vertex[row[q]])
+            result[q] = sense * (sense * (lines @ bary[q])).min()
         return np.asarray(result)
 
     def split(self) -> tuple[Ints, tuple[Ints, Floats, Floats, Ints]]:
@@ -126,12 +126,12 @@ def sharpened_cut(
     edges = edges[~np.isnan(positions[edges])]
     new_positions = _crossings(mesh, level_set, edges, positions)
     is_changed = ~np.isnan(positions) & (new_positions != positions)
-    where, points = _vertices(mesh, level_set, cells_near, new_positions, numbers, on_points)
-    is_cut_anew = is_changed[mesh.cell_to_edge[cells]].any(axis=1) | np.isin(cells, list(where))
+    kinks, points = _vertices(mesh, level_set, cells_near, new_positions, numbers, on_points)
+    is_cut_anew = is_changed[mesh.cell_to_edge[cells]].any(axis=1) | np.isin(cells, list(kinks))
     rows = np.sort(cells[is_cut_anew])
     values = _values(mesh, level_set.phi, rows, new_positions)
     vertex = np.full((len(rows), 3), np.nan)
-    for cell, at in where.items():
+    for cell, at in kinks.items():
         vertex[np.searchsorted(rows, cell)] = at
     return Kinks(lock(points), lock(rows), lock(values), lock(vertex)), new_positions
 
@@ -183,17 +183,17 @@ def _vertices(
     ends = np.stack([_crossing_ends(v) for v in _values(mesh, level_set.phi, cells, positions)])
     x = np.einsum("ceb,cbd->ced", ends, mesh.points[mesh.cells[cells]])
     piece = _pieces(line, x.reshape(-1, 2)).reshape(-1, 2)
-    first, last = piece.min(axis=1), piece.max(axis=1)
+    start, end = piece.min(axis=1), piece.max(axis=1)
     is_tip = np.zeros(len(mesh.cells), dtype=bool)
     is_tip[np.concatenate([*level_set.tip_cells, np.zeros(0, np.int64)])] = True
-    where, points = {}, []
+    cell_to_kink, points = {}, []
     for k in numbers:
         touch = np.linalg.norm(x - line[k], axis=2).min(axis=1) <= _AT * mesh.cell_size[cells]
         if touch.any() or k in on_points:
             points.append(line[k])
             continue
-        inner = (first < numbers[:, None]) & (numbers[:, None] <= last)
-        cells_of_kink = np.nonzero((first < k) & (k <= last) & (inner.sum(axis=0) == 1))[0]
+        has_kink = (start < numbers[:, None]) & (numbers[:, None] <= end)
+        cells_of_kink = np.nonzero((start < k) & (k <= end) & (has_kink.sum(axis=0) == 1))[0]
         if len(cells_of_kink) != 1 or is_tip[cells[cells_of_kink[0]]]:
             continue
         cell = cells[cells_of_kink[0]]
@@ -203,9 +203,9 @@ def _vertices(
             abs(np.linalg.det([ends[cells_of_kink[0], 0], at, ends[cells_of_kink[0], 1]]))
             > _ROUND_OFF
         ):
-            where[int(cell)] = at
+            cell_to_kink[int(cell)] = at
             points.append(at @ mesh.points[mesh.cells[cell]])
-    return where, np.array(points).reshape(-1, 2)
+    return cell_to_kink, np.array(points).reshape(-1, 2)
 
 
 def _pieces(line: Floats, x: Floats) -> Ints:
@@ -223,14 +223,14 @@ def _values(mesh: Mesh, phi: Floats, cells: Ints, positions: Floats) -> Floats:
     lone_side = np.where((side == 0).any(axis=1), 0.0, side.sum(axis=1))[:, None]
     lone_corner = np.argmax(np.where(lone_side == 0, side != 0, side * lone_side < 0), axis=1)
     for k in (1, 2):
-        other = (lone_corner + k) % 3
-        edge = mesh.cell_to_edge[cells, lone_corner + other - 1]  # edges 01, 02, 12
+        other_corner = (lone_corner + k) % 3
+        edge = mesh.cell_to_edge[cells, lone_corner + other_corner - 1]  # edges 01, 02, 12
         t = positions[edge]
         t = np.where(mesh.edges[edge, 0] == mesh.cells[cells, lone_corner], t, 1 - t)
-        is_crossed = side[row, lone_corner] * side[row, other] < 0
+        is_crossed = side[row, lone_corner] * side[row, other_corner] < 0
         with np.errstate(invalid="ignore"):
             new_value = -values[row, lone_corner] * (1 - t) / t
-        values[row, other] = np.where(is_crossed, new_value, values[row, other])
+        values[row, other_corner] = np.where(is_crossed, new_value, values[row, other_corner])
     return values
 
 
@@ -258,10 +258,10 @@ def _two_lines(values: Floats, vertex: Floats) -> tuple[Floats, float]:
 
     With the sign such that the sign times the smaller of both times the sign is like the level set.
     """
-    first, last = _crossing_ends(values)
-    lines = np.stack([np.cross(first, vertex), np.cross(vertex, last)])
+    start, end = _crossing_ends(values)
+    lines = np.stack([np.cross(start, vertex), np.cross(vertex, end)])
     lines /= np.abs(lines).max(axis=1, keepdims=True)
-    sense = 1.0 if np.linalg.det([first, vertex, last]) > 0 else -1.0
+    sense = 1.0 if np.linalg.det([start, vertex, end]) > 0 else -1.0
     corner = int(np.argmax(np.abs(values)))
     level = sense * (sense * lines[:, corner]).min()
     sign = 1.0 if level * values[corner] > 0 else -1.0

@@ -53,7 +53,7 @@ class LevelSet:
     line: Floats = field(default_factory=lambda: lock(np.zeros((0, 2))))
 
     @property
-    def inside(self) -> Floats:
+    def psi_of_ends(self) -> Floats:
         """Negative along the crack: the largest psi of all its ends `(n,)`."""
         return np.asarray(np.vstack([self.psi, self.mouth[None]]).max(axis=0))
 
@@ -97,11 +97,11 @@ def snap_to_vertices(mesh: Mesh, phi: Floats) -> Floats:
         is_crossed = a * b < 0
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(is_crossed, a / (a - b), 0.5)
-        low, high = is_crossed & (share < SNAP), is_crossed & (share > 1 - SNAP)
-        if not (low.any() or high.any()):
+        at_begin, at_end = is_crossed & (share < SNAP), is_crossed & (share > 1 - SNAP)
+        if not (at_begin.any() or at_end.any()):
             return phi
-        phi[mesh.edges[low, 0]] = 0.0
-        phi[mesh.edges[high, 1]] = 0.0
+        phi[mesh.edges[at_begin, 0]] = 0.0
+        phi[mesh.edges[at_end, 1]] = 0.0
 
 
 # Level sets of a polyline at the points of a mesh.
@@ -126,8 +126,8 @@ def line_levels(mesh: Mesh, crack: Crack) -> LevelSet:
         ray, neighbour = (0, 1) if tip == 0 else (n_segments - 1, n_segments - 2)
         # Points nearest to the kink behind the last piece are as near to one piece as to the
         # other: round-off must not decide.
-        last = np.linalg.norm(vertices[neighbour + 1] - vertices[neighbour])
-        is_on_ray = (segment == ray) | ((segment == neighbour) & (psi_on_ray > -last))
+        neighbour_length = np.linalg.norm(vertices[neighbour + 1] - vertices[neighbour])
+        is_on_ray = (segment == ray) | ((segment == neighbour) & (psi_on_ray > -neighbour_length))
         psi[k] = np.where(is_on_ray, psi_on_ray, psi_behind)
     mouth = np.full(mesh.n_points, -reach)
     for end, ray in ((0, 0), (len(crack.points) - 1, n_segments - 1)):
@@ -150,9 +150,9 @@ def tied_to_tips(
     tip_cells = tuple(cells_around(mesh, point, ON_MESH) for point in x)
     for k, cells in enumerate(tip_cells):
         nodes = np.unique(mesh.cells[cells])
-        local = mesh.points[nodes] - x[k]
-        phi[nodes] = local @ frame[k, 1]
-        psi[k, nodes] = local @ frame[k, 0]
+        from_tip = mesh.points[nodes] - x[k]
+        phi[nodes] = from_tip @ frame[k, 1]
+        psi[k, nodes] = from_tip @ frame[k, 0]
         at_tip = np.zeros(mesh.n_points, dtype=bool)
         at_tip[nodes] = True
         near_edge |= at_tip[mesh.edges[:, 0]] | at_tip[mesh.edges[:, 1]]
@@ -166,16 +166,16 @@ def _prolongation(points: Floats, reach: float) -> tuple[Floats, Floats]:
     Beyond such a crossing of a crack that turns by more than half a circle the sides of the two
     pieces contradict each other.
     """
-    first, last = points[0], points[-1]
-    backward_direction, on = _unit(first - points[1]), _unit(last - points[-2])
-    first_reach = _free_reach(first, backward_direction, points[1:], reach)
-    last_reach = _free_reach(last, on, points[:-1], reach)
-    segment_ahead = np.stack([last, last + last_reach * on])
-    first_reach = _free_reach(first, backward_direction, segment_ahead, first_reach)
+    start, end = points[0], points[-1]
+    backward_direction, on = _unit(start - points[1]), _unit(end - points[-2])
+    first_reach = _free_reach(start, backward_direction, points[1:], reach)
+    last_reach = _free_reach(end, on, points[:-1], reach)
+    segment_ahead = np.stack([end, end + last_reach * on])
+    first_reach = _free_reach(start, backward_direction, segment_ahead, first_reach)
     last_reach = _free_reach(
-        last, on, np.stack([first, first + first_reach * backward_direction]), last_reach
+        end, on, np.stack([start, start + first_reach * backward_direction]), last_reach
     )
-    return first + first_reach * backward_direction, last + last_reach * on
+    return start + first_reach * backward_direction, end + last_reach * on
 
 
 def _free_reach(origin: Floats, direction: Floats, polyline: Floats, reach: float) -> float:
@@ -412,8 +412,8 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     for k, front in enumerate(fronts):
         psi[k] = _shifted_psi(mesh, phi, psi[k], near_edge, front, band)
     tip_cells = tuple(_front_cells(mesh, phi, p, near_edge) for p in psi)
-    one = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
-    return LevelSet(lock(phi), lock(psi), tip_cells, lock(one), lock(mouth), lock(near_edge))
+    x_front = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
+    return LevelSet(lock(phi), lock(psi), tip_cells, lock(x_front), lock(mouth), lock(near_edge))
 
 
 def with_far_sides(mesh: Mesh, crack: Crack, levels: "LevelSet", reach: float) -> "LevelSet":
@@ -443,8 +443,8 @@ def with_far_sides(mesh: Mesh, crack: Crack, levels: "LevelSet", reach: float) -
 
 def _largest_cells(mesh: Mesh, crack: Crack) -> float:
     """Largest cell that the surface runs through, length."""
-    nearest = mesh.cell_tree.query(crack.points[crack.faces].mean(axis=1))[1]
-    return float(mesh.cell_size[nearest].max())
+    nearest_cells = mesh.cell_tree.query(crack.points[crack.faces].mean(axis=1))[1]
+    return float(mesh.cell_size[nearest_cells].max())
 
 
 def _front_distance(
@@ -486,13 +486,13 @@ def _shifted_psi(
     if np.abs(offset).max() < _STRAIGHT * mesh.cell_size[cells].mean():
         return psi
     rows = np.nonzero(np.abs(psi) < 2 * band)[0]
-    distance, nearest = cKDTree(middle).query(mesh.points[rows], k=min(_CHORDS, len(middle)))
-    distance, nearest = (a.reshape(len(rows), -1) for a in (distance, nearest))
+    distance, nearest_chords = cKDTree(middle).query(mesh.points[rows], k=min(_CHORDS, len(middle)))
+    distance, nearest_chords = (a.reshape(len(rows), -1) for a in (distance, nearest_chords))
     # Chords beside a bend must not move the straight part next to it.
     excess = (distance**2 - distance[:, :1] ** 2) / mesh.cell_size[cells].mean() ** 2
-    share = length[nearest] * np.exp(-np.minimum(excess, 50.0))
+    share = length[nearest_chords] * np.exp(-np.minimum(excess, 50.0))
     shifted = psi.copy()
-    shifted[rows] += (share * offset[nearest]).sum(axis=1) / share.sum(axis=1)
+    shifted[rows] += (share * offset[nearest_chords]).sum(axis=1) / share.sum(axis=1)
     return shifted
 
 
@@ -543,8 +543,8 @@ def _surface_shift(
         Distances of points to it, up to a reach.
     """
     shift = np.zeros(mesh.n_points)
-    low, high = _bounds(mesh, phi)
-    cells = np.nonzero((low < 0) & (high > 0) & ~(_bounds(mesh, at_end)[1] > 0))[0]
+    phi_min, phi_max = _bounds(mesh, phi)
+    cells = np.nonzero((phi_min < 0) & (phi_max > 0) & ~(_bounds(mesh, at_end)[1] > 0))[0]
     height = (tree.corners - tree.corners[0, 0]) @ tree.normal[0]
     if np.ptp(height) < _STRAIGHT * mesh.cell_size[cells].min(initial=np.inf):
         return shift  # a plane: phi is linear
@@ -604,16 +604,16 @@ def _chords(mesh: Mesh, phi: Floats, psi: Floats, cells: Ints) -> tuple[Floats, 
 def _foot(front: Front, segment: Ints, position: Floats) -> tuple[Floats, Floats]:
     """Points on a front and the directions ahead of it there."""
     t = position[:, None]
-    second = (segment + 1) % len(front.x)
-    foot = (1 - t) * front.x[segment] + t * front.x[second]
-    direction = (1 - t) * front.frame[segment, 0] + t * front.frame[second, 0]
+    next_vertex = (segment + 1) % len(front.x)
+    foot = (1 - t) * front.x[segment] + t * front.x[next_vertex]
+    direction = (1 - t) * front.frame[segment, 0] + t * front.frame[next_vertex, 0]
     return foot, direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
 def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints:
     """Cells whose closed set meets phi = psi = 0."""
-    low, high = _bounds(mesh, phi)
-    rows = np.nonzero((low <= 0) & (high >= 0))[0]
+    phi_min, phi_max = _bounds(mesh, phi)
+    rows = np.nonzero((phi_min <= 0) & (phi_max >= 0))[0]
     edge = mesh.cell_to_edge[rows]
     a, b = mesh.edges[edge, 0], mesh.edges[edge, 1]
     is_crossed = phi[a] * phi[b] < 0
@@ -623,11 +623,11 @@ def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints
         at_edge = np.where(is_crossed, (1 - t) * psi[a] + t * psi[b], np.nan)
     corner = mesh.cells[rows]
     at_corner = np.where(phi[corner] == 0, psi[corner], np.nan)
-    every = np.concatenate([at_edge, at_corner], axis=1)
-    every = np.where(np.abs(every) < _AT * mesh.cell_size[rows][:, None], 0.0, every)
-    low = np.where(np.isnan(every), np.inf, every).min(axis=1)
-    high = np.where(np.isnan(every), -np.inf, every).max(axis=1)
-    return rows[is_close & (low <= 0) & (high >= 0)]
+    levels = np.concatenate([at_edge, at_corner], axis=1)
+    levels = np.where(np.abs(levels) < _AT * mesh.cell_size[rows][:, None], 0.0, levels)
+    psi_min = np.where(np.isnan(levels), np.inf, levels).min(axis=1)
+    psi_max = np.where(np.isnan(levels), -np.inf, levels).max(axis=1)
+    return rows[is_close & (psi_min <= 0) & (psi_max >= 0)]
 
 
 __all__ = []

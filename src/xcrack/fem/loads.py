@@ -71,17 +71,17 @@ def _add_tractions(forces: list[Floats], space: FunctionSpace, loads: Sequence[L
         if loads[k].where not in sets:
             sets[loads[k].where] = _outer_facets(space, loads[k])
     facets = np.concatenate(list(sets.values()))
-    number_of_set = np.repeat(np.arange(len(sets)), [len(each) for each in sets.values()])
+    number_of_set = np.repeat(np.arange(len(sets)), [len(facet) for facet in sets.values()])
     points, normal, owner = _points_on_facets(space, facets)
     x = position(space, points.cell, points.bary)
     rows = {name: (number_of_set[owner] == k).nonzero()[0] for k, name in enumerate(sets)}
     density = np.zeros((len(pull), len(x), space.dim))
     for values, k in zip(density, pull, strict=True):
-        chosen = rows[loads[k].where]
+        at_set = rows[loads[k].where]
         places = FacetPoints(
-            space.mesh, sets[loads[k].where], x[chosen], normal[chosen], points.weight[chosen]
+            space.mesh, sets[loads[k].where], x[at_set], normal[at_set], points.weight[at_set]
         )
-        values[chosen] = loads[k].traction(places)
+        values[at_set] = loads[k].traction(places)
     _add_densities([forces[k] for k in pull], space, points, density)
 
 
@@ -102,11 +102,11 @@ def outer_points(space: FunctionSpace, load: Load, halvings: int = 0) -> tuple[P
 def _outer_facets(space: FunctionSpace, load: Load) -> Ints:
     """The facet set of a load, all of whose facets lie on the boundary."""
     facets = facet_set(space.mesh, load.where, load.name)
-    inner = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
-    if inner.any():
+    is_interior = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 1] >= 0
+    if is_interior.any():
         raise ProblemError(
-            f"{load.name}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
-            "boundary only."
+            f"{load.name}: {int(is_interior.sum())} of its facets lie inside the body; loads act "
+            "on the boundary only."
         )
     return facets
 
@@ -217,8 +217,8 @@ def _subtract_stress(f: Floats, space: FunctionSpace, points: Points, sigma: Flo
     """Subtract the integral of sigma0 : grad v."""
     for batch, _ in space.batches(np.unique(points.cell)):
         number, row, _ = points.of_cells(batch.cells)
-        where = points.bary[number], points.side[number]
-        _, G = space.tabulate(batch, row, *where, values=False)
+        bary_and_side = points.bary[number], points.side[number]
+        _, G = space.tabulate(batch, row, *bary_and_side, values=False)
         force = -np.einsum("q,qij,qnj->qni", points.weight[number], sigma[number], G)
         _scatter(f, batch.functions[row], force)
 
@@ -243,11 +243,11 @@ def lip_force(space: FunctionSpace, c: int, lips: LipPoints, force: Floats) -> F
 def mesh_loads(space: FunctionSpace, loads: Iterable[MeshLoad]) -> dict[int, Floats]:
     """Vectors `(n_dof,)` of loads of an earlier solve that act on plain cells here, by identity."""
     result = {}
-    for one in loads:
-        if not space.signature[one.cells].any():
+    for mesh_load in loads:
+        if not space.signature[mesh_load.cells].any():
             f = np.zeros(space.n_dof)
-            f[: len(one.f)] = one.f
-            result[id(one.load)] = f
+            f[: len(mesh_load.f)] = mesh_load.f
+            result[id(mesh_load.load)] = f
     return result
 
 
@@ -258,19 +258,19 @@ def on_mesh(
 
     What is known of them from an earlier solve in the mesh serves again.
     """
-    loads_before = {id(one.load): one for one in previous_loads}
+    loads_before = {id(mesh_load.load): mesh_load for mesh_load in previous_loads}
     result = []
     for load, f in loads:
         if load.acts != {"traction"}:
             continue
-        one = loads_before.get(id(load))
-        if one is None:
+        mesh_load = loads_before.get(id(load))
+        if mesh_load is None:
             facets = facet_set(space.mesh, load.where, "")
             cells = space.mesh.facet_to_cell[numbers_of(space.mesh, facets), 0]
             standard = f[: space.n_nodes * space.dim]
-            one = MeshLoad(load, lock(np.array(cells)), lock(standard.copy()))
-        if not space.signature[one.cells].any():
-            result.append(one)
+            mesh_load = MeshLoad(load, lock(np.array(cells)), lock(standard.copy()))
+        if not space.signature[mesh_load.cells].any():
+            result.append(mesh_load)
     return tuple(result)
 
 

@@ -231,7 +231,7 @@ def _on_front(bary: Floats, r: Floats, size: Floats) -> tuple[list[tuple[Ints, F
     n_touching = at.sum(axis=1)
     edge, is_far = n_touching == 2, n_touching == 0
     rows = (np.nonzero(edge)[0], np.nonzero(~edge & ~is_far)[0])
-    return [(chosen, corner[chosen]) for chosen in rows], is_far
+    return [(touching_rows, corner[touching_rows]) for touching_rows in rows], is_far
 
 
 def _swept_points(touching_parts: list[tuple[Ints, Floats]], share: Floats, n: int) -> list[_Parts]:
@@ -239,8 +239,8 @@ def _swept_points(touching_parts: list[tuple[Ints, Floats]], share: Floats, n: i
     result = []
     for (rows, corner), rule in zip(touching_parts, (_edge_rule, _vertex_rule), strict=True):
         is_tiny = share[rows] < (1 - _SAME) * _TINY
-        for chosen, k in ((~is_tiny, n), (is_tiny, max(n - 1, 2))):
-            result.append(_rule_points(rows[chosen], corner[chosen], share[rows[chosen]], rule(k)))
+        for mask, k in ((~is_tiny, n), (is_tiny, max(n - 1, 2))):
+            result.append(_rule_points(rows[mask], corner[mask], share[rows[mask]], rule(k)))
     return result
 
 
@@ -316,12 +316,12 @@ def triangle_points(r: Floats, size: Floats, degree: int = 4) -> tuple[Ints, Flo
         corner = np.take_along_axis(corner, first[:, :, None], axis=1)
         r = np.take_along_axis(r, first, axis=1)
         is_near = (n_touching == 0) & (r.min(axis=1) < _NEAR * size) & (level == 0)
-        for chosen, rule in (
+        for mask, rule in (
             (n_touching == 2, _side_rule()),
             ((n_touching == 1) | (n_touching == 3), _corner_rule()),
             ((n_touching == 0) & ~is_near, simplex_rule(2, degree)),
         ):
-            rows = np.nonzero(chosen)[0]
+            rows = np.nonzero(mask)[0]
             place = np.einsum("pv,svb->spb", rule[0], corner[rows])
             weight = share[rows, None] * rule[1]
             parts.append(
@@ -468,7 +468,7 @@ class Points:
     weight: Floats
     side: Ints
 
-    def chosen(self, selection: Bools | Ints) -> "Points":
+    def subset(self, selection: Bools | Ints) -> "Points":
         """Some of the points, by a mask or by their numbers."""
         return Points(
             self.cell[selection], self.bary[selection], self.weight[selection], self.side[selection]
@@ -546,8 +546,8 @@ def _sub_cells_at_joints(space: FunctionSpace, subs: SubCells) -> SubCells:
     """Sub-cells with the sides of cracks that end on others, split where both cut a cell."""
     for joint in space.joints:
         phi = space.cuts[joint.crack].level_set.phi
-        chosen = joint.is_in_both[subs.cell] & (subs.side[:, joint.on] == joint.side)
-        subs = _split_along(space, subs, phi, chosen, _ROUND_OFF)
+        is_crossed = joint.is_in_both[subs.cell] & (subs.side[:, joint.on] == joint.side)
+        subs = _split_along(space, subs, phi, is_crossed, _ROUND_OFF)
     if space.dim == 3:
         subs = _sub_cells_at_ends_of_fronts(space, subs)
     centre = subs.bary.mean(axis=1)
@@ -559,28 +559,28 @@ def _sub_cells_at_ends_of_fronts(space: FunctionSpace, subs: SubCells) -> SubCel
     for joint in space.joints:
         cut = space.cuts[joint.crack]
         for psi in cut.level_set.psi:
-            chosen = (joint.is_in_both & cut.is_tip)[subs.cell] & (
+            is_crossed = (joint.is_in_both & cut.is_tip)[subs.cell] & (
                 subs.side[:, joint.on] == joint.side
             )
-            subs = _split_along(space, subs, psi, chosen, _AT)
+            subs = _split_along(space, subs, psi, is_crossed, _AT)
     return subs
 
 
 def _split_along(
-    space: FunctionSpace, subs: SubCells, values: Floats, chosen: Bools, tolerance: float
+    space: FunctionSpace, subs: SubCells, values: Floats, is_chosen: Bools, tolerance: float
 ) -> SubCells:
     """Chosen sub-cells split along the zero of a linear function, in their order."""
     nodes = space.mesh.cells[subs.cell]
     value = np.einsum("svb,sb->sv", subs.bary, values[nodes])
     is_small = np.abs(value) < tolerance * np.abs(value).max(axis=1, keepdims=True)
     value[is_small] = 0.0
-    split = chosen & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
+    split = is_chosen & (value.min(axis=1) < 0) & (value.max(axis=1) > 0)
     whole_parts, rows = np.nonzero(~split)[0], np.nonzero(split)[0]
     x = np.einsum("svb,sbd->svd", subs.bary[rows], space.mesh.points[nodes[rows]])
-    inner, share, _, parent = cut_simplices(value[rows], x)
+    bary_in_sub, share, _, parent = cut_simplices(value[rows], x)
     source = np.concatenate([whole_parts, rows[parent]])
     order = np.argsort(source, kind="stable")
-    bary_of_parts = np.einsum("svw,swb->svb", inner, subs.bary[rows[parent]])
+    bary_of_parts = np.einsum("svw,swb->svb", bary_in_sub, subs.bary[rows[parent]])
     source = source[order]
     return SubCells(
         subs.cell[source],
@@ -618,36 +618,36 @@ def cell_points(
     subs = sub_cells(space, cells)
     with_tip = space.has_tip[subs.cell]
     if space.dim == 2:
-        number, where, share = _plane_points(space, subs, with_tip, n, degree, circles)
+        number, point_bary, share = _plane_points(space, subs, with_tip, n, degree, circles)
         cell = subs.cell[number]
-        return Points(cell, where, share * space.mesh.volume[cell], subs.side[number])
+        return Points(cell, point_bary, share * space.mesh.volume[cell], subs.side[number])
     plain_rows = (~with_tip).nonzero()[0]
     bary, weight = simplex_rule(space.dim, degree)
     number = np.repeat(plain_rows, len(weight))
-    where = np.einsum("pv,svb->spb", bary, subs.bary[plain_rows]).reshape(-1, space.dim + 1)
+    point_bary = np.einsum("pv,svb->spb", bary, subs.bary[plain_rows]).reshape(-1, space.dim + 1)
     share = np.outer(subs.fraction[plain_rows], weight).ravel()
     rows = with_tip.nonzero()[0]
     if not len(rows):
-        return _sorted_points(space, subs, number, where, share)
+        return _sorted_points(space, subs, number, point_bary, share)
     is_near = space, subs.cell[rows], subs.bary[rows], subs.fraction[rows], n
     sub, place, part = graded_points(*is_near, degree) if is_graded else front_points(*is_near)
     return _sorted_points(
         space,
         subs,
         np.concatenate([number, rows[sub]]),
-        np.concatenate([where, place]),
+        np.concatenate([point_bary, place]),
         np.concatenate([share, part]),
     )
 
 
 def _sorted_points(
-    space: FunctionSpace, subs: SubCells, numbers: Ints, every: Floats, part: Floats
+    space: FunctionSpace, subs: SubCells, numbers: Ints, bary: Floats, part: Floats
 ) -> Points:
     """Points of sub-cells, sorted by sub-cell, and so by cell."""
     order = np.argsort(numbers, kind="stable")
     numbers = numbers[order]
     cell = subs.cell[numbers]
-    return Points(cell, every[order], part[order] * space.mesh.volume[cell], subs.side[numbers])
+    return Points(cell, bary[order], part[order] * space.mesh.volume[cell], subs.side[numbers])
 
 
 __all__ = []

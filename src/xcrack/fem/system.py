@@ -100,7 +100,7 @@ def discretise(problem: Problem) -> tuple[FunctionSpace, tuple[LipPoints, ...]]:
             reach = front_reach(mesh, level_set_cracks[on], numerics.radius)
             level_sets[on] = with_far_sides(mesh, level_set_cracks[on], level_sets[on], reach)
     geometry = CELLS[mesh.dim]
-    cuts = tuple(cut(mesh, each, geometry) for each in level_sets)
+    cuts = tuple(cut(mesh, levels_of_crack, geometry) for levels_of_crack in level_sets)
     joints: tuple[Joint, ...] = ()
     if junctions:
         cuts, joints = geometry.joined_cuts(mesh, cuts, junctions)

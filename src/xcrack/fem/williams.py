@@ -64,9 +64,9 @@ def mode_matrix(kolosov: float, mu: float) -> Floats:
     """
     k = kolosov
     scale = 1 / (2 * mu * np.sqrt(2 * np.pi))
-    first = [[k - 1, 0, 1, 0], [0, k + 1, 0, -1]]
-    second = [[0, k + 1, 0, 1], [1 - k, 0, 1, 0]]
-    return scale * np.array([first, second], dtype=float)
+    mode_I = [[k - 1, 0, 1, 0], [0, k + 1, 0, -1]]
+    mode_II = [[0, k + 1, 0, 1], [1 - k, 0, 1, 0]]
+    return scale * np.array([mode_I, mode_II], dtype=float)
 
 
 def unit_gradients(r: Floats, theta: Floats, kolosov: float, mu: float) -> Floats:

@@ -125,7 +125,7 @@ def _without_exits(space: FunctionSpace, subs: SubCells) -> tuple[Ints, Floats, 
         if not cut.n_tips:
             continue
         phi = np.einsum("svb,sb->sv", bary, cut.level_set.phi[corner])
-        psi = np.einsum("svb,sb->sv", bary, cut.level_set.inside[corner])
+        psi = np.einsum("svb,sb->sv", bary, cut.level_set.psi_of_ends[corner])
         tolerance = 1e-9 * space.mesh.cell_size[subs.cell][:, None]
         exits = (np.abs(phi) <= tolerance) & (psi > 0) & (bary.max(axis=2) < 1 - 1e-12)
         exits &= (subs.fan & cut.is_tip[subs.cell])[:, None]
@@ -370,7 +370,7 @@ def _lip(space: FunctionSpace, cell: Ints, bary: Floats, side: Ints) -> Ints:
     for c, cut in enumerate(space.cuts):
         phi = cut.level(space.mesh, cell, bary)
         # A crack without tips lies behind them everywhere.
-        psi = (bary * np.maximum(cut.level_set.inside, -1e300)[corner]).sum(axis=1)
+        psi = (bary * np.maximum(cut.level_set.psi_of_ends, -1e300)[corner]).sum(axis=1)
         lip[:, c] = np.where((np.abs(phi) <= tolerance) & (psi < -tolerance), side[:, c], 0)
     return lip
 

@@ -438,11 +438,11 @@ def _domain_parts(
         near_points, feet = curve.points_near(x, outer)
         if not len(near_points):
             return None
-        points = points.chosen(near_points)
+        points = points.subset(near_points)
         counts = before_junctions(space, tip.crack, points)
         if not counts.all():
-            near_points, feet = near_points[counts], feet.chosen(counts)
-            points = points.chosen(counts)
+            near_points, feet = near_points[counts], feet.subset(counts)
+            points = points.subset(counts)
         gradient = gradients_at(space, coefficients, points.cell, points.bary, points.side)
         is_behind = np.einsum("qb,qb->q", psi[mesh.cells[points.cell]], points.bary) < 0
         force, side = _force(solutions, x[near_points]), points.side[:, tip.crack]
@@ -457,7 +457,7 @@ def _domain_parts(
             )  # fmt: skip
         total = np.zeros((len(solutions), radii.shape[1], 3, len(knots)))
         for material, rows, ratio in materials.parts(feet.s):
-            local_gradient, of_feet = gradient[rows], feet.chosen(rows)
+            local_gradient, of_feet = gradient[rows], feet.subset(rows)
             cell, bary = points.cell[rows], points.bary[rows]
             change, rise, no_turn = (
                 elasticity.stress_change(material, local_gradient, cell, bary),
@@ -544,7 +544,7 @@ def _lip_part(
         if local_gradient is not None and ratio is not None:
             local_gradient = local_gradient * ratio[0][None, :, None, None, None]
         total += lip_integrals(
-            curve, knots, feet.chosen(rows), normal[rows], weight[rows], traction[rows], material,
+            curve, knots, feet.subset(rows), normal[rows], weight[rows], traction[rows], material,
             radii, gradient=local_gradient, initial_stress=initial_stress,
         )  # fmt: skip
     return total

@@ -60,7 +60,7 @@ def before_junctions(space: FunctionSpace, crack: int, points: Points) -> Bools:
     result = np.ones(len(points.cell), dtype=bool)
     for joint in space.joints:
         if joint.crack == crack:
-            level_inside = space.cuts[joint.on].level_set.inside[space.mesh.cells[points.cell]]
+            level_inside = space.cuts[joint.on].level_set.psi_of_ends[space.mesh.cells[points.cell]]
             is_ahead = np.einsum("qb,qb->q", level_inside, points.bary) > 0
             result &= is_ahead | (points.side[:, joint.on] == joint.side)
     return result
@@ -117,12 +117,12 @@ def _boundary_around(
     near_points, feet = curve.points_near(position(space, points.cell, points.bary), reach)
     if not len(near_points):
         return None
-    points, normal = points.chosen(near_points), normal[near_points]
+    points, normal = points.subset(near_points), normal[near_points]
     counts = before_junctions(space, crack, points)
     if not counts.any():
         return None
     if not counts.all():
-        points, normal, feet = points.chosen(counts), normal[counts], feet.chosen(counts)
+        points, normal, feet = points.subset(counts), normal[counts], feet.subset(counts)
     axes = _fixed_axes(solutions, points)
     if axes is None:
         no_points = np.zeros(len(points.cell), dtype=bool)
@@ -154,10 +154,10 @@ def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: fl
         sides = lip_side(space, joint.on, cell, bary, joint.side)
         points = Points(cell, bary, weight, sides)
         counts = before_junctions(space, crack, points)
-        points = points.chosen(counts)
+        points = points.subset(counts)
         normal = -joint.side * cut.lip_normal[rows][number[near_points]][counts]
         no_points = np.zeros(len(points.cell), dtype=bool)
-        result.append(Sides(points, normal, feet.chosen(counts), no_points, no_points))
+        result.append(Sides(points, normal, feet.subset(counts), no_points, no_points))
     return result
 
 
@@ -189,7 +189,7 @@ def _fixed_axes(solutions: Sequence[Solution], points: Points) -> Floats | None:
 def room_beside(sides: Sides, curve: FrontCurve, knots: Floats) -> Floats:
     """Distance of the hats to what is held, as far as it reaches into their domains `(p,)`."""
     room = np.full(len(knots), np.inf)
-    feet = sides.feet.chosen(sides.reaction)
+    feet = sides.feet.subset(sides.reaction)
     hat, share, _ = hats(curve, knots, feet.s)
     for place, value in ((0, 1 - share), (1, share)):
         counts = value > 0
@@ -256,7 +256,7 @@ def integrals_of_sides(
         counts = before_junctions(space, crack, points)
         if not counts.all():
             points, normal, feet, traction = (
-                points.chosen(counts), normal[counts], feet.chosen(counts), traction[counts]
+                points.subset(counts), normal[counts], feet.subset(counts), traction[counts]
             )  # fmt: skip
         total += _integrals(
             solutions, t, points, normal, feet, traction, curve, knots, radii, materials
@@ -293,7 +293,7 @@ def _integrals(
         if local_gradient is not None and ratio is not None:
             local_gradient = local_gradient * ratio[0][:, None, None, None]
         total += side_integrals(
-            curve, knots, feet.chosen(rows), normal[rows], points.weight[rows], traction[rows],
+            curve, knots, feet.subset(rows), normal[rows], points.weight[rows], traction[rows],
             side[rows], is_behind[rows], material, radii, gradient=local_gradient,
             initial_stress=initial_stress,
         )  # fmt: skip
@@ -320,7 +320,7 @@ def _loaded_points(
         near_points, feet = curve.points_near(on_facets.x, reach)
         factor = np.array([sum(f for one, f in s.acting if one is load) for s in solutions])
         traction = load.traction(on_facets)[near_points, :, None] * factor
-        result.append((points.chosen(near_points), on_facets.normal[near_points], feet, traction))
+        result.append((points.subset(near_points), on_facets.normal[near_points], feet, traction))
     return result
 
 

@@ -188,12 +188,12 @@ def add_flux(defect, piece, value, normal, moment):  # type: ignore[no-untyped-d
     for q in range(len(piece)):
         k = piece[q]
         if moment.shape[1] == 1 and normal.shape[1] == 3:  # written out: a quarter of the time
-            x, y, z, one = normal[q, 0], normal[q, 1], normal[q, 2], moment[q, 0]
+            x, y, z, m0 = normal[q, 0], normal[q, 1], normal[q, 2], moment[q, 0]
             for f in range(value.shape[1]):
                 v = value[q, f]
-                defect[k, f, 0, 0] += v * x * one
-                defect[k, f, 1, 0] += v * y * one
-                defect[k, f, 2, 0] += v * z * one
+                defect[k, f, 0, 0] += v * x * m0
+                defect[k, f, 1, 0] += v * y * m0
+                defect[k, f, 2, 0] += v * z * m0
             continue
         for f in range(value.shape[1]):
             v = value[q, f]
@@ -258,11 +258,11 @@ def take_volume(defect, gram, piece, weight, value, slope, moment, scale):  # ty
             for b in range(moment.shape[1]):
                 gram[k, a, b] += w * moment[q, a] * moment[q, b]
         if moment.shape[1] == 1 and slope.shape[2] == 3:
-            one = moment[q, 0]
+            m0 = moment[q, 0]
             for f in range(value.shape[1]):
-                defect[k, f, 0, 0] -= w * slope[q, f, 0] * one
-                defect[k, f, 1, 0] -= w * slope[q, f, 1] * one
-                defect[k, f, 2, 0] -= w * slope[q, f, 2] * one
+                defect[k, f, 0, 0] -= w * slope[q, f, 0] * m0
+                defect[k, f, 1, 0] -= w * slope[q, f, 1] * m0
+                defect[k, f, 2, 0] -= w * slope[q, f, 2] * m0
             continue
         for f in range(value.shape[1]):
             for j in range(slope.shape[2]):
@@ -320,11 +320,11 @@ def solve_moments(defect, gram, tolerance):  # type: ignore[no-untyped-def]
                         A[i, k], A[j, k] = c * a - s * b, s * a + c * b
                         a, b = V[k, i], V[k, j]
                         V[k, i], V[k, j] = c * a - s * b, s * a + c * b
-        largest = 0.0
+        diagonal_max = 0.0
         for i in range(n):
-            largest = max(largest, abs(A[i, i]))
+            diagonal_max = max(diagonal_max, abs(A[i, i]))
         for k in range(n):
-            if abs(A[k, k]) > tolerance * largest:
+            if abs(A[k, k]) > tolerance * diagonal_max:
                 for i in range(n):
                     for j in range(n):
                         inverse[i, j] += V[i, k] * V[j, k] / A[k, k]
@@ -359,10 +359,10 @@ def add_correction(slope, first, piece, row, coefficient, moment, functions):  #
             if functions[row[q], first + f] < 0:
                 continue
             if moment.shape[1] == 1 and slope.shape[2] == 3:
-                one = moment[q, 0]
-                slope[q, first + f, 0] += coefficient[k, f, 0, 0] * one
-                slope[q, first + f, 1] += coefficient[k, f, 1, 0] * one
-                slope[q, first + f, 2] += coefficient[k, f, 2, 0] * one
+                m0 = moment[q, 0]
+                slope[q, first + f, 0] += coefficient[k, f, 0, 0] * m0
+                slope[q, first + f, 1] += coefficient[k, f, 1, 0] * m0
+                slope[q, first + f, 2] += coefficient[k, f, 2, 0] * m0
                 continue
             for j in range(slope.shape[2]):
                 for a in range(moment.shape[1]):

@@ -68,25 +68,25 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
         for a in range(n):
             i = nodes[e, a]
             for b in range(n):
-                low, high = indptr[i], indptr[i + 1] - 1
+                begin, end = indptr[i], indptr[i + 1] - 1
                 node = nodes[e, b]
-                while low < high:
-                    middle = (low + high) // 2
+                while begin < end:
+                    middle = (begin + end) // 2
                     if indices[middle] < node:
-                        low = middle + 1
+                        begin = middle + 1
                     else:
-                        high = middle
-                slot[e, a, b] = low
+                        end = middle
+                slot[e, a, b] = begin
     return indptr, indices, slot
 
 
 @kernel
-def _add_remainder(data, low, high, slot, weight, G, remainder):  # type: ignore[no-untyped-def]
+def _add_remainder(data, start, stop, slot, weight, G, remainder):  # type: ignore[no-untyped-def]
     """Add what a stiffness that is not isotropic has besides, at one point of a cell."""
     n, d = G.shape
     half_product = np.empty((d, d, d))
     for a in range(n):
-        if not low <= slot[a, 0] < high:
+        if not start <= slot[a, 0] < stop:
             continue
         for i in range(d):
             for j in range(d):
@@ -105,7 +105,7 @@ def _add_remainder(data, low, high, slot, weight, G, remainder):  # type: ignore
 
 @kernel
 def add_block_stiffness(  # type: ignore[no-untyped-def]
-    data, low, high, cells, slot, gradient, volume, derivative, bary, weight, factor, lam, mu,
+    data, start, stop, cells, slot, gradient, volume, derivative, bary, weight, factor, lam, mu,
     remainder,
 ):  # fmt: skip
     """Add the elastic stiffness of plain cells of one material to some rows of node blocks.
@@ -136,7 +136,7 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
     for e in cells:
         is_touched = False
         for a in range(n):
-            is_touched |= low <= slot[e, a, 0] < high
+            is_touched |= start <= slot[e, a, 0] < stop
         if not is_touched:
             continue
         for q in range(len(weight)):
@@ -153,10 +153,10 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
                         total += derivative[q, a, k] * gradient[e, k, i]
                     G[a, i] = total
             if remainder is not None:
-                _add_remainder(data, low, high, slot[e], w, G, remainder)
+                _add_remainder(data, start, stop, slot[e], w, G, remainder)
             if d == 2:  # written out: two thirds of the time
                 for a in range(n):
-                    if not low <= slot[e, a, 0] < high:
+                    if not start <= slot[e, a, 0] < stop:
                         continue
                     ax, ay = w * G[a, 0], w * G[a, 1]
                     for b in range(n):
@@ -169,7 +169,7 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
                         data[k, 1, 1] += P_modulus * yy + mu * xx
                 continue
             for a in range(n):
-                if not low <= slot[e, a, 0] < high:
+                if not start <= slot[e, a, 0] < stop:
                     continue
                 for b in range(n):
                     block = data[slot[e, a, b]]
@@ -320,14 +320,14 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
 
 @kernel
 def _slot(indptr, indices, row, column):  # type: ignore[no-untyped-def]
-    low, high = indptr[row], indptr[row + 1] - 1
-    while low < high:
-        middle = (low + high) // 2
+    begin, end = indptr[row], indptr[row + 1] - 1
+    while begin < end:
+        middle = (begin + end) // 2
         if indices[middle] < column:
-            low = middle + 1
+            begin = middle + 1
         else:
-            high = middle
-    return low
+            end = middle
+    return begin
 
 
 @kernel
@@ -407,7 +407,7 @@ def _scatter(  # type: ignore[no-untyped-def]
         fa, k = functions[place[a]], at[a] * d
         for b in range(max(a, n_std), n_active):
             fb, m = functions[place[b]], at[b] * d
-            one, other = _slot(indptr, indices, fa, fb), _slot(indptr, indices, fb, fa)
+            slot_ab, slot_ba = _slot(indptr, indices, fa, fb), _slot(indptr, indices, fb, fa)
             trace = 0.0
             for i in range(d):
                 trace += block[k + i, m + i]
@@ -420,9 +420,9 @@ def _scatter(  # type: ignore[no-untyped-def]
                         for p in range(d):
                             for q in range(d):
                                 v += remainder[i, p, j, q] * block[k + p, m + q]
-                    data[one, i, j] += v
+                    data[slot_ab, i, j] += v
                     if a != b:
-                        data[other, j, i] += v
+                        data[slot_ba, j, i] += v
 
 
 @kernel
