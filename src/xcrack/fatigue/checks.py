@@ -46,11 +46,11 @@ def evaluate_criterion(
     if n == 0:
         return np.zeros(0), np.zeros(0), np.zeros(0)
     if isinstance(nu, np.ndarray):
-        every = np.empty((3, n))
+        values = np.empty((3, n))
         for value in np.unique(nu).tolist():
             rows = nu == value
-            every[:, rows] = evaluate_criterion(criterion, K[:, rows], value, crack, place)
-        return every[0], every[1], every[2]
+            values[:, rows] = evaluate_criterion(criterion, K[:, rows], value, crack, place)
+        return values[0], values[1], values[2]
     result = call_function(criterion, f"the directions of crack {crack}", K.copy(), nu)
     try:
         parts = tuple(result)
@@ -174,8 +174,8 @@ def law_needs(law: Law, dK_eq: Floats, R: Floats, a: Floats | None) -> dict[str,
 
 def depends_on_ratio(law: Law | LawSets, dK_eq: Floats) -> bool:
     """Whether a law gives other rates for other ratios R at these ranges `(f,)`."""
-    low, high = (evaluate_law(law, dK_eq, np.full(len(dK_eq), ratio), 0) for ratio in _RATIOS)
-    return not np.array_equal(low, high)
+    rate_0, rate_1 = (evaluate_law(law, dK_eq, np.full(len(dK_eq), ratio), 0) for ratio in _RATIOS)
+    return not np.array_equal(rate_0, rate_1)
 
 
 def law_exponent(

@@ -307,8 +307,8 @@ def _sum(values: Floats) -> Floats:
 
 def _angle_of_largest(score: Floats, angle: Floats) -> Floats:
     """Angle `(f,)` of the state with the largest score `(s, f)`; the smallest of those that tie."""
-    largest = score.max(axis=0)
-    is_tied = score >= largest - _TIE * np.abs(score).max(axis=0)
+    largest_score = score.max(axis=0)
+    is_tied = score >= largest_score - _TIE * np.abs(score).max(axis=0)
     return np.asarray(np.where(is_tied, angle, np.inf).min(axis=0))
 
 
@@ -338,10 +338,10 @@ def _angle_and_range(
 
 def _component_range(K: Floats, angle: Floats, nu: float) -> Floats:
     """Largest K_eq of the difference of two states, in both orders."""
-    largest = np.zeros(K.shape[1])
+    K_max = np.zeros(K.shape[1])
     for state in K:
-        np.maximum(largest, equivalent_K(clipped_K(K - state), angle, nu).max(axis=0), out=largest)
-    return largest
+        np.maximum(K_max, equivalent_K(clipped_K(K - state), angle, nu).max(axis=0), out=K_max)
+    return K_max
 
 
 def local_equivalent_K(K: Floats, angle: Floats, nu: float | Floats) -> Floats:

@@ -126,10 +126,10 @@ class BoundsRule(Rule):
 
     def check(self, value: Any, what: str, error: type[XcrackError]) -> Bounds:
         """Both as float."""
-        low, high = numbers(value, what, (2,), error=error).tolist()
-        if not low < high:
-            raise error(f"{what} = ({low:g}, {high:g}): give (lowest, highest).")
-        return low, high
+        lower_bound, upper_bound = numbers(value, what, (2,), error=error).tolist()
+        if not lower_bound < upper_bound:
+            raise error(f"{what} = ({lower_bound:g}, {upper_bound:g}): give (lowest, highest).")
+        return lower_bound, upper_bound
 
 
 Approach = Annotated[str | float, ApproachRule()]
@@ -299,12 +299,12 @@ def range_and_ratio(
 
 
 def _check_within(name: str, dK: Floats, ratio: Floats, bounds: Bounds) -> None:
-    low, high = bounds
-    is_outside = (dK > 0) & ((ratio < low - ROUND_OFF) | (ratio > high + ROUND_OFF))
+    R_min, R_max = bounds
+    is_outside = (dK > 0) & ((ratio < R_min - ROUND_OFF) | (ratio > R_max + ROUND_OFF))
     if is_outside.any():
         first = np.broadcast_to(ratio, is_outside.shape)[is_outside].flat[0]
         raise ProblemError(
-            f"{name}: R = {first:.6g} is outside {low:g} to {high:g}, where its constants were "
+            f"{name}: R = {first:.6g} is outside {R_min:g} to {R_max:g}, where its constants were "
             "fitted: take a law for this R, or give another R_range if you know that they hold."
         )
 

@@ -264,14 +264,14 @@ class Metal:
                 f"material {self.name!r}: no source with a growth law was read: give one of your "
                 "own, such as xc.paris(C, m)."
             )
-        chosen = next(iter(self.laws)) if name is None else name
-        if not isinstance(chosen, str) or chosen not in self.laws:
+        law_name = next(iter(self.laws)) if name is None else name
+        if not isinstance(law_name, str) or law_name not in self.laws:
             raise ProblemError(
-                f"material {self.name!r}: no law {value_text(chosen)}: give one of "
+                f"material {self.name!r}: no law {value_text(law_name)}: give one of "
                 f"{', '.join(map(repr, self.laws))}."
             )
-        law = self.laws[chosen]
-        if thickness is None or chosen == "forman":
+        law = self.laws[law_name]
+        if thickness is None or law_name == "forman":
             return law
         return replace(law, K_c=self.K_c(thickness))
 

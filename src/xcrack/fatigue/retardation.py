@@ -133,17 +133,17 @@ class willenborg(Constants):  # noqa: N801
         self, K_min: ArrayLike, K_max: ArrayLike, K_overload: ArrayLike, da: ArrayLike
     ) -> Floats:
         """Reduction of K, after growth by da since an overload, stress √length."""
-        low, high, K_of_overload, growth = (
+        K_low, K_top, K_of_overload, growth = (
             numbers(value, f"willenborg: {name}")
             for name, value in zip(
                 ("K_min", "K_max", "K_overload", "da"), (K_min, K_max, K_overload, da)
             )
         )
-        dK = high - low
+        dK = K_top - K_low
         share = np.divide(self.dK_th, dK, out=np.ones_like(dK), where=dK > 0)
         phi = np.maximum(1 - share, 0.0) / (self.shutoff - 1)
         share_left = np.maximum(1 - growth / self.zone(K_of_overload), 0.0)
-        return np.asarray(np.maximum(phi * (K_of_overload * np.sqrt(share_left) - high), 0.0))[()]
+        return np.asarray(np.maximum(phi * (K_of_overload * np.sqrt(share_left) - K_top), 0.0))[()]
 
 
 Retardation = wheeler | willenborg
@@ -366,7 +366,7 @@ def march(
     root = np.asarray((rate <= _TINY * largest_rate).any(axis=0))
     with np.errstate(divide="ignore"):
         values = np.where(root, rate ** (1 / exponent), np.log(np.maximum(rate, _SMALLEST)))
-    threshold_range = np.array([getattr(one, "dK_th", 0.0) for one in models])[None, :, None]
+    threshold_range = np.array([getattr(m, "dK_th", 0.0) for m in models])[None, :, None]
     share = np.divide(threshold_range, cycles.dK, out=np.ones_like(cycles.dK), where=cycles.dK > 0)
     growth_since, size, zone_K = np.array(zones.since), np.array(zones.size), np.array(zones.K)
     arc, cycles_elapsed = np.zeros(x.shape), np.zeros(len(x))
@@ -382,10 +382,10 @@ def march(
         root,
         exponent,
         share,
-        np.array([0.0 if one is None else one.zone.factor for one in models]),
+        np.array([0.0 if m is None else m.zone.factor for m in models]),
         0 if first is None else 1 if isinstance(first, wheeler) else 2,
-        np.array([getattr(one, "w", 1.0) for one in models]),
-        np.array([getattr(one, "shutoff", 2.0) for one in models]),
+        np.array([getattr(m, "w", 1.0) for m in models]),
+        np.array([getattr(m, "shutoff", 2.0) for m in models]),
         growth_since,
         size,
         zone_K,
@@ -410,13 +410,13 @@ def cycle_rates(
 ) -> Floats:
     """Rates `(k, n, p, s)` with a share of K_max taken from both ends of each cycle."""
     K_max = largest_K(cycles.dK, cycles.R)[..., None]
-    largest = K_max * (1 - shifts)
+    reduced_K_max = K_max * (1 - shifts)
     K_min = np.maximum(K_max - cycles.dK[..., None] - K_max * shifts, 0.0)
-    dK = np.where(shifts == 0, cycles.dK[..., None], largest - K_min)
-    R = np.divide(K_min, largest, out=np.zeros_like(largest), where=largest > 0)
+    dK = np.where(shifts == 0, cycles.dK[..., None], reduced_K_max - K_min)
+    R = np.divide(K_min, reduced_K_max, out=np.zeros_like(reduced_K_max), where=reduced_K_max > 0)
     R = np.where(shifts == 0, cycles.R[..., None], np.minimum(R, 1.0))
     a = np.broadcast_to(cycles.a[..., None, None], dK.shape)
-    columns = (np.ascontiguousarray(each).ravel() for each in (dK, R, a))
+    columns = (np.ascontiguousarray(column).ravel() for column in (dK, R, a))
     dK_, R_, a_ = columns
     names = None
     if material is not None and isinstance(law, LawSets):

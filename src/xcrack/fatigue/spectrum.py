@@ -74,8 +74,8 @@ def closed_cycles(values: Floats) -> list[tuple[int, int]]:
     for point in order:
         stack.append(point)
         while len(stack) >= 3:
-            first, second, third_value = x[stack[-3]], x[stack[-2]], x[stack[-1]]
-            if abs(third_value - second) < abs(second - first):
+            first_value, second_value, third_value = x[stack[-3]], x[stack[-2]], x[stack[-1]]
+            if abs(third_value - second_value) < abs(second_value - first_value):
                 break
             pairs.append((stack[-3], stack[-2]))
             del stack[-3:-1]
@@ -210,10 +210,10 @@ class Spectrum(Declared):
             )
         getattr(self, f"_check_{forms[0]}")()
         if self.least_range > 0 and not len(self.cycles):
-            every = self._all_cycles
+            cycles = self._all_cycles
             raise ProblemError(
                 f"Spectrum: least_range = {self.least_range:g} leaves out all cycles: their "
-                f"largest range is {(every['max'] - every['min']).max():g}. Give less."
+                f"largest range is {(cycles['max'] - cycles['min']).max():g}. Give less."
             )
 
     def _check_factors(self) -> None:
@@ -224,13 +224,13 @@ class Spectrum(Declared):
         rows = self.rows
         is_invalid = ~((rows[:, 0] < rows[:, 1]) & (rows[:, 2] > 0))
         if not len(rows) or is_invalid.any():
-            where = (
+            location = (
                 f"rows[{int(np.argmax(is_invalid))}] = {rows[np.argmax(is_invalid)]}"
                 if len(rows)
                 else "rows"
             )
             raise ProblemError(
-                f"Spectrum: {where}: give (min, max, count) with min < max, count > 0."
+                f"Spectrum: {location}: give (min, max, count) with min < max, count > 0."
             )
 
     def _check_states(self) -> None:
@@ -271,20 +271,20 @@ class Spectrum(Declared):
         (k,) structured array
             Columns min, max, count, and at: which point of the history the maximum is.
         """
-        every = self._all_cycles
-        return every[every["max"] - every["min"] >= self.least_range]
+        cycles = self._all_cycles
+        return cycles[cycles["max"] - cycles["min"] >= self.least_range]
 
     @property
     def left_out(self) -> NDArray[Any]:
         """Cycles of a block below `least_range`; columns as of `cycles`."""
-        every = self._all_cycles
-        return every[every["max"] - every["min"] < self.least_range]
+        cycles = self._all_cycles
+        return cycles[cycles["max"] - cycles["min"] < self.least_range]
 
     @property
     def extremes(self) -> tuple[float, float]:
         """Smallest and largest factor."""
-        every = self._all_cycles
-        return float(every["min"].min()), float(every["max"].max())
+        cycles = self._all_cycles
+        return float(cycles["min"].min()), float(cycles["max"].max())
 
     @property
     def ratio(self) -> float | None:

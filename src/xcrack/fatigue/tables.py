@@ -98,8 +98,8 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for low, high in zip(self.curves, self.curves[1:]):
-            _check_pair(low, high)
+        for c0, c1 in zip(self.curves, self.curves[1:]):
+            _check_pair(c0, c1)
 
     @property
     def knows_negative_ratios(self) -> bool:
@@ -127,59 +127,59 @@ class rate_table(GrowthLaw):  # noqa: N801 - it is used as a function
         ratio = np.clip(R, lowest_R, highest_R)
         result = np.zeros(dK.shape)
         is_left = np.ones(dK.shape, dtype=bool)
-        for low, high in zip(self.curves, self.curves[1:] or self.curves):
-            is_between = is_left & (ratio <= high[0] + (high is low))
-            result[is_between] = _rates_between(low, high, dK[is_between], ratio[is_between])
+        for c0, c1 in zip(self.curves, self.curves[1:] or self.curves):
+            is_between = is_left & (ratio <= c1[0] + (c1 is c0))
+            result[is_between] = _rates_between(c0, c1, dK[is_between], ratio[is_between])
             is_left &= ~is_between
         return result
 
 
-def _knots(low: Curve, high: Curve) -> tuple[Floats, Floats, Floats]:
+def _knots(c0: Curve, c1: Curve) -> tuple[Floats, Floats, Floats]:
     """Logarithms of the rates that both curves have, and of the range of each there."""
-    first, last = max(low[2][0], high[2][0]), min(low[2][-1], high[2][-1])
-    rates = np.union1d(low[2], high[2])
-    rates = np.log(rates[(rates >= first) & (rates <= last)])
-    one, other = (np.interp(rates, np.log(c[2]), np.log(c[1])) for c in (low, high))
-    return rates, one, other
+    start, end = max(c0[2][0], c1[2][0]), min(c0[2][-1], c1[2][-1])
+    rates = np.union1d(c0[2], c1[2])
+    rates = np.log(rates[(rates >= start) & (rates <= end)])
+    x_low, x_high = (np.interp(rates, np.log(c[2]), np.log(c[1])) for c in (c0, c1))
+    return rates, x_low, x_high
 
 
-def _check_pair(low: Curve, high: Curve) -> None:
+def _check_pair(c0: Curve, c1: Curve) -> None:
     """Refuse neighbours whose curves cross, or are too far apart."""
-    if low[0] == high[0]:
-        raise ProblemError(f"rate_table: two curves of R = {low[0]:g}.")
-    rates, one, other = _knots(low, high)
+    if c0[0] == c1[0]:
+        raise ProblemError(f"rate_table: two curves of R = {c0[0]:g}.")
+    rates, x_low, x_high = _knots(c0, c1)
     if len(rates) < 2:
         raise ProblemError(
-            f"rate_table: the curves of R = {low[0]:g} and {high[0]:g} have no rates in common."
+            f"rate_table: the curves of R = {c0[0]:g} and {c1[0]:g} have no rates in common."
         )
-    m = 1 + (one - other) / np.log((1 - high[0]) / (1 - low[0]))
+    m = 1 + (x_low - x_high) / np.log((1 - c1[0]) / (1 - c0[0]))
     if (m < -_ROUND_OFF).any() or (m > 1 + _ROUND_OFF).any():
         worst_row = int(np.argmax(np.abs(m - 0.5)))
         raise ProblemError(
-            f"rate_table: the curves of R = {low[0]:g} and {high[0]:g} have Walker's exponent "
+            f"rate_table: the curves of R = {c0[0]:g} and {c1[0]:g} have Walker's exponent "
             f"{m[worst_row]:.3g} at the rate {np.exp(rates[worst_row]):.3g}: it must lie in [0, 1]."
         )
 
 
-def _rates_between(low: Curve, high: Curve, dK: Floats, R: Floats) -> Floats:
+def _rates_between(c0: Curve, c1: Curve, dK: Floats, R: Floats) -> Floats:
     """Rates of points `(n,)` with R between those of two curves, or on one curve."""
-    if high[0] == low[0]:
-        rates, one = np.log(low[2]), np.log(low[1])
-        weight, other = np.zeros(len(R)), one
+    if c1[0] == c0[0]:
+        rates, x_low = np.log(c0[2]), np.log(c0[1])
+        weight, x_high = np.zeros(len(R)), x_low
     else:
-        rates, one, other = _knots(low, high)
-        weight = np.log((1 - low[0]) / (1 - R)) / np.log((1 - low[0]) / (1 - high[0]))
+        rates, x_low, x_high = _knots(c0, c1)
+        weight = np.log((1 - c0[0]) / (1 - R)) / np.log((1 - c0[0]) / (1 - c1[0]))
         # on a curve all of it counts, not only the rates that its neighbour has too
-        on_low, on_high = R <= low[0], R >= high[0]
+        on_low, on_high = R <= c0[0], R >= c1[0]
         if on_low.any() or on_high.any():
             result = np.zeros(len(R))
-            for curve, is_on_curve in ((low, on_low), (high, on_high)):
+            for curve, is_on_curve in ((c0, on_low), (c1, on_high)):
                 result[is_on_curve] = _rates_between(curve, curve, dK[is_on_curve], R[is_on_curve])
             is_between = ~(on_low | on_high)
             if is_between.any():
-                result[is_between] = _rates_between(low, high, dK[is_between], R[is_between])
+                result[is_between] = _rates_between(c0, c1, dK[is_between], R[is_between])
             return result
-    knots = one + weight[:, None] * (other - one)
+    knots = x_low + weight[:, None] * (x_high - x_low)
     with np.errstate(divide="ignore"):
         x = np.log(dK)
     piece = np.clip((knots <= x[:, None]).sum(axis=1), 1, len(rates) - 1)

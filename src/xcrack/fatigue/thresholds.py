@@ -92,9 +92,9 @@ class stepped_threshold(Threshold):  # noqa: N801
 
     def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R, stress √length."""
-        low, high = self.R
-        on_slope = self.dK[1] - self.slope * (R - low)
-        return np.asarray(np.where(R < low, self.dK[0], np.where(R < high, on_slope, self.dK[2])))
+        R0, R1 = self.R
+        on_slope = self.dK[1] - self.slope * (R - R0)
+        return np.asarray(np.where(R < R0, self.dK[0], np.where(R < R1, on_slope, self.dK[2])))
 
 
 @dataclass(frozen=True)
@@ -206,10 +206,10 @@ class nasgro3_threshold(_OfNewman):  # noqa: N801
     def value(self, R: Floats, a: Floats | None, closure: Closure | None) -> Floats:
         """Threshold for R of a crack of the size a, stress √length."""
         assert isinstance(closure, newman_closure)
-        inner = closure(R) / (1 - closure.A[0])
+        opening_ratio = closure(R) / (1 - closure.A[0])
         size = short_crack_factor(a, self.a0, "nasgro3_threshold")
         with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            value = np.asarray(self.dK0 * size / inner ** (1 + self.C_th * R))
+            value = np.asarray(self.dK0 * size / opening_ratio ** (1 + self.C_th * R))
         return _check_finite("nasgro3_threshold", value, R)
 
 

@@ -123,18 +123,18 @@ class with_time(Constants):  # noqa: N801
     def __call__(self, dK_eq: ArrayLike, R: ArrayLike, **inputs: ArrayLike) -> Floats:
         """Growth a cycle of each point, length."""
         dK, ratio = range_and_ratio("with_time", dK_eq, R)
-        high = largest_K(dK, ratio)
-        if not np.isfinite(high).all():
+        K_max = largest_K(dK, ratio)
+        if not np.isfinite(K_max).all():
             raise ProblemError("with_time: R = 1 with a range, K_max is not known: give R < 1.")
         by_cycle = np.asarray(self.law(dK_eq, R, **inputs))
-        return np.asarray(by_cycle + self.period * self._mean_rate(high, high - dK))[()]
+        return np.asarray(by_cycle + self.period * self._mean_rate(K_max, K_max - dK))[()]
 
-    def _mean_rate(self, high: Floats, low: Floats) -> Floats:
+    def _mean_rate(self, K_max: Floats, K_min: Floats) -> Floats:
         """Mean of the rate over a period."""
         if self.wave == "hold":
-            return np.asarray(self.rate(high))
+            return np.asarray(self.rate(K_max))
         rise = _TAU if self.wave == "triangle" else 0.5 * (1 - np.cos(np.pi * _TAU))
-        K = low[..., None] + (high - low)[..., None] * rise
+        K = K_min[..., None] + (K_max - K_min)[..., None] * rise
         return np.asarray(self.rate(K) @ _WEIGHT)
 
 

@@ -106,7 +106,7 @@ def march_places(  # type: ignore[no-untyped-def]
         u = length_reached / spacing
         row = min(int(u), n_points - 2)
         x = u - row
-        largest = 0.0
+        largest_rate = 0.0
         for i in range(n):
             K = 0.0
             for k in range(K_max.shape[0]):
@@ -116,7 +116,7 @@ def march_places(  # type: ignore[no-untyped-def]
             zone_size = zone[i] * K * K
             if model > 0 and growth_since[i] + zone_size >= size[i]:
                 growth_since[i], size[i], zone_K[i] = 0.0, zone_size, K
-            low, fraction = 0, 0.0
+            s, fraction = 0, 0.0
             if model == 2 and K > 0 and growth_since[i] < size[i]:
                 threshold = 0.0
                 for k in range(K_max.shape[0]):
@@ -125,25 +125,25 @@ def march_places(  # type: ignore[no-untyped-def]
                 phi = max(0.0, 1.0 - threshold) / (shutoff[i] - 1.0)
                 reduction = phi * (zone_K[i] * np.sqrt(1.0 - growth_since[i] / size[i]) - K)
                 place = min(max(reduction / K, 0.0), 1.0) * (n_shifts - 1)
-                low = min(int(place), n_shifts - 2)
-                fraction = place - low
-            rate = _interpolated_rate(weight, line, x, row, values, is_root, exponent, i, kind, low)
+                s = min(int(place), n_shifts - 2)
+                fraction = place - s
+            rate = _interpolated_rate(weight, line, x, row, values, is_root, exponent, i, kind, s)
             if fraction > 0:
-                other = _interpolated_rate(
-                    weight, line, x, row, values, is_root, exponent, i, kind, low + 1
+                next_rate = _interpolated_rate(
+                    weight, line, x, row, values, is_root, exponent, i, kind, s + 1
                 )
-                rate += fraction * (other - rate)
+                rate += fraction * (next_rate - rate)
             if model == 1 and growth_since[i] + zone_size < size[i]:
                 rate *= (zone_size / (size[i] - growth_since[i])) ** w[i]
             growth[i] = rate
-            largest = max(largest, rate)
+            largest_rate = max(largest_rate, rate)
         cycles_left = min(1.0 - part, most_cycles - cycles_elapsed)
         cycles_done = cycles_left
-        if length_reached + cycles_left * largest >= length:
-            cycles_done = min(cycles_left, (length - length_reached) / largest)
+        if length_reached + cycles_left * largest_rate >= length:
+            cycles_done = min(cycles_left, (length - length_reached) / largest_rate)
             length_after = length
         else:
-            length_after = length_reached + cycles_left * largest
+            length_after = length_reached + cycles_left * largest_rate
         while rows_filled < n_points and (
             rows_filled * spacing <= length_after or length_after >= length
         ):
