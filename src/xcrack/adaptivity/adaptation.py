@@ -106,9 +106,9 @@ class Adaptation:
         lines = [f"{'round':>5} {'cells':>8} {'unknowns':>9} {'largest best K':>15} "
                  f"{'error':>8} {'seconds':>8}"]  # fmt: skip
         for k, row in enumerate(self.rounds):
-            largest = row.best.flat[np.argmax(np.abs(row.best))] if row.best.size else np.nan
+            largest_K = row.best.flat[np.argmax(np.abs(row.best))] if row.best.size else np.nan
             lines.append(
-                f"{k:>5} {row.cells:>8} {row.unknowns:>9} {largest:>15.7g} {row.error:>8.1e} "
+                f"{k:>5} {row.cells:>8} {row.unknowns:>9} {largest_K:>15.7g} {row.error:>8.1e} "
                 f"{row.seconds:>8.2f}"
             )
         end = "met" if self.met else f"not met: {self.reason}"

@@ -56,18 +56,18 @@ class Indicators:
         """What errors of all K are compared with, stress · √length."""
         return self.scale_of(self.K)
 
-    def scale_of(self, best: Floats) -> float:
+    def scale_of(self, best_K: Floats) -> float:
         """The largest of some best K, or where that is next to nothing a share of K by the energy.
 
         A crack that is closed by symmetry has K = 0: what a mesh gives is its error, and no cell
         is small enough for a share of that.
         """
-        largest = float(np.abs(best).max(initial=0.0))
-        if not largest > 0:
-            return largest
+        largest_K = float(np.abs(best_K).max(initial=0.0))
+        if not largest_K > 0:
+            return largest_K
         size = max(self.problem.sizes, default=0.0)
         K_of_energy = mean_stress(self.solutions) * np.sqrt(np.pi * size)
-        return max(largest, float(_FAINT * K_of_energy))
+        return max(largest_K, float(_FAINT * K_of_energy))
 
     @property
     def worst_place(self) -> str:
@@ -105,14 +105,14 @@ class Indicators:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why tips have no bar, each once."""
-        every = [
+        reasons_of_tips = [
             reason
             for state in self.sifs
             for sif in state
             for reason, at_surface in zip(sif.reasons, sif.at_surface, strict=True)
             if reason and not at_surface
         ]
-        return tuple(dict.fromkeys(every))
+        return tuple(dict.fromkeys(reasons_of_tips))
 
 
 def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
@@ -149,12 +149,12 @@ def indicators_of(problem: Problem, states: Sequence[Any]) -> Indicators:
         for crack, rows in zip(problem.placed, by_crack, strict=True)
     )
     sifs_of = tuple(tuple(rows[k] for rows in by_crack) for k in range(len(solutions)))
-    best, bar = values(sifs_of, numbers_under_load, surface_reach)
+    best_K, bar = values(sifs_of, numbers_under_load, surface_reach)
     return Indicators(
         problem,
         tuple(replace(s, factored=None) for s in solutions),
         sifs_of,
-        best,
+        best_K,
         bar,
         np.concatenate(shares),
         surface_reach,
@@ -168,16 +168,16 @@ def values(
 
     Of a crack none of whose places count, K is one zero and its half-width nan.
     """
-    best, bar = [], []
+    best_K, bar = [], []
     for c in range(len(surface_reach)):
         for sif in (sifs[k][c] for k in numbers_under_load):
             is_counted = counted_places(sif, surface_reach[c])
             nothing = np.zeros((int(len(sif.K) > 0 and not is_counted.any()), sif.K.shape[1]))
-            best += [sif.best[is_counted], nothing]
+            best_K += [sif.best[is_counted], nothing]
             bar += [sif.bar[is_counted], nothing + np.nan]
-    if not best:
+    if not best_K:
         return np.zeros((0, 2)), np.zeros((0, 2))
-    return np.concatenate(best), np.concatenate(bar)
+    return np.concatenate(best_K), np.concatenate(bar)
 
 
 def counted_places(sif: SIF, surface_reach: float) -> Bools:

@@ -37,11 +37,11 @@ def _sizes_at_lines(problem: Problem, trial: int) -> Callable[[Floats], Floats]:
     """Longest edges of cells at points: small at the ends, and in later trials all along."""
     mesh = problem.mesh
     place, size = [np.zeros((0, 2))], [np.zeros(0)]
-    every = [_ends(crack, mesh) for crack in problem.cracks]
+    ends = [_ends(crack, mesh) for crack in problem.cracks]
     for c, crack in enumerate(problem.cracks):
         length = length_inside(crack, mesh)
-        for k, x in enumerate(every[c]):
-            other_points = np.concatenate([np.delete(every[c], k, 0), *every[:c], *every[c + 1 :]])
+        for k, x in enumerate(ends[c]):
+            other_points = np.concatenate([np.delete(ends[c], k, 0), *ends[:c], *ends[c + 1 :]])
             distance = np.linalg.norm(other_points - x, axis=1)
             least_distance = float(distance[distance > 0].min(initial=np.inf))
             place.append(x[None])
@@ -114,7 +114,7 @@ def _outline(crack: Crack, body: Body) -> tuple[Floats, float]:
     """
     lines = [np.append(loop, loop[0]) for loop in loops(crack.faces)]
     lines = lines if crack.fronts is None else list(crack.fronts)
-    ends = np.concatenate([np.stack([one[:-1], one[1:]], axis=1) for one in lines])
+    ends = np.concatenate([np.stack([line[:-1], line[1:]], axis=1) for line in lines])
     a, b = crack.points[ends].transpose(1, 0, 2)
     side = np.linalg.norm(b - a, axis=1)
     area = area_inside(crack, body.mesh)

@@ -47,21 +47,21 @@ def size_ratios(shares: Floats, bar: Floats, target: float, order: int, dim: int
     """
     power = 2 * order + dim
     ratio = np.ones(shares.shape[1])
-    for each, half in zip(shares, bar, strict=True):
-        total = each.sum()
+    for cell_shares, half in zip(shares, bar, strict=True):
+        total = cell_shares.sum()
         error = half if np.isfinite(half) else total
         if not total > 0 or error <= target:
             continue
         aim = target * total / error
-        low, high = 0.0, float(each.max())
+        t_min, t_max = 0.0, float(cell_shares.max())
         for _ in range(_STEPS):
-            threshold = (low + high) / 2
-            error_left = np.minimum(each, threshold) ** (2 * order / power)
-            error_left *= each ** (dim / power)
-            low, high = (threshold, high) if error_left.sum() < aim else (low, threshold)
-        is_above = each > low
+            threshold = (t_min + t_max) / 2
+            error_left = np.minimum(cell_shares, threshold) ** (2 * order / power)
+            error_left *= cell_shares ** (dim / power)
+            t_min, t_max = (threshold, t_max) if error_left.sum() < aim else (t_min, threshold)
+        is_above = cell_shares > t_min
         ratio[is_above] = np.minimum(
-            ratio[is_above], (max(low, 1e-300) / each[is_above]) ** (1 / power)
+            ratio[is_above], (max(t_min, 1e-300) / cell_shares[is_above]) ** (1 / power)
         )
     return np.maximum(ratio, 2.0 ** (-_MOST / dim))
 
@@ -174,18 +174,18 @@ def _ends(indicators: Indicators) -> list[int]:
 def next_mesh(indicators: Indicators, tolerance: float, aim: float, most_cells: int) -> Mesh | None:
     """A finer mesh, or None where it would have too many unknowns."""
     mesh, scale = indicators.problem.mesh, indicators.scale
-    each = indicators.solutions[0].space.n_dof / len(mesh.cells)
+    unknowns_per_cell = indicators.solutions[0].space.n_dof / len(mesh.cells)
     for share in aim * 2.0 ** np.arange(1 + _GENTLER):
         target = tolerance * scale * share
         ratio = cell_ratios(indicators, target, 1.0)
         fine_mesh = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
         while len(fine_mesh.cells) < _LEAST * len(mesh.cells):  # the bar does not follow the shares
-            largest = np.argsort(indicators.shares.max(axis=0, initial=0.0))[
+            worst_cells = np.argsort(indicators.shares.max(axis=0, initial=0.0))[
                 -(len(mesh.cells) // 10) - 1 :
             ]
-            ratio[largest] /= 2
+            ratio[worst_cells] /= 2
             fine_mesh = refine_to(mesh, ratio * mesh.cell_size, _SWEEPS)
-        if each * len(fine_mesh.cells) <= most_cells:
+        if unknowns_per_cell * len(fine_mesh.cells) <= most_cells:
             return fine_mesh
     return None
 

@@ -66,8 +66,8 @@ def next_mesh(indicators: Indicators, tolerance: float, aim: float, most_cells: 
             size = size * size_ratio / _refinement_factor(indicators, c, tolerance, aim)
         sizes.append(size)
     mesh = refine(problem.mesh, size=graded_sizes(places, sizes))
-    each = indicators.solutions[0].space.n_dof / len(problem.mesh.cells)
-    return mesh if each * len(mesh.cells) <= most_cells else None
+    unknowns_per_cell = indicators.solutions[0].space.n_dof / len(problem.mesh.cells)
+    return mesh if unknowns_per_cell * len(mesh.cells) <= most_cells else None
 
 
 def _refinement_factor(indicators: Indicators, c: int, tolerance: float, aim: float) -> float:
@@ -156,18 +156,18 @@ def _shorten_errors(sif: SIF, previous_sif: SIF, is_finer: bool) -> SIF:
     is_inside, is_inside_before = ~sif.at_surface, ~previous_sif.at_surface
     if not is_inside_before.any():
         return sif
-    nearest = np.nonzero(is_inside_before)[0][
+    nearest_rows = np.nonzero(is_inside_before)[0][
         cKDTree(previous_sif.x[is_inside_before]).query(sif.x)[1]
     ]
-    every = np.abs(sif.best - previous_sif.best[nearest])
+    changes = np.abs(sif.best - previous_sif.best[nearest_rows])
     for front in np.unique(sif.front):
         is_on_front = (sif.front == front) & is_inside
         if not is_on_front.any():
             continue
-        change = every[is_on_front]
+        change = changes[is_on_front]
         change = np.maximum(change, np.sqrt((change**2).mean(axis=0)))
         if not is_finer:
-            change = np.maximum(change, previous_sif.bar[nearest][is_on_front])
+            change = np.maximum(change, previous_sif.bar[nearest_rows][is_on_front])
         bar[is_on_front] = np.fmin(bar[is_on_front], change)
     bar[sif.closed, 0] = sif.bar[sif.closed, 0]
     return replace(sif, errors=KErrors(sif.eta, bar, sif.reasons))
