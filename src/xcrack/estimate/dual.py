@@ -161,9 +161,9 @@ def groups_of(factored: FactoredSolution) -> GoalGroups | None:
             parts.append((rows, is_active, pressure, number, position, piece))
     if not parts or contact.dual is None:
         return None
-    every, is_closed, pressures, crack, position, piece = zip(*parts, strict=True)
+    all_rows, is_closed, pressures, crack, position, piece = zip(*parts, strict=True)
     return GoalGroups(
-        sp.csr_matrix(sp.vstack(every)),
+        sp.csr_matrix(sp.vstack(all_rows)),
         contact.dual,
         np.concatenate(is_closed, axis=1),
         np.concatenate(pressures),
@@ -227,16 +227,16 @@ def duals(
         return DualSolutions(z, np.zeros(states, dtype=np.int64), nothing[None], nothing)
     per_pressure = groups.N @ z0 + _on_groups(factored, groups, goals)
     sets, set_number = np.unique(groups.active, axis=0, return_inverse=True)
-    every, mus = [], []
+    zs, mus = [], []
     for is_active in sets:
         z, mu = z0, np.zeros_like(per_pressure)
         if is_active.any():
             columns = [of_set(groups.dual, -d, is_active)[0] for d in per_pressure.T]
             mu = np.stack(columns, axis=1)
             z = z0 - factored.engine.solve(groups.N.T @ mu)
-        every.append(without_motion(motion, z))
+        zs.append(without_motion(motion, z))
         mus.append(mu)
-    return DualSolutions(np.stack(every), set_number.ravel(), np.stack(mus), per_pressure)
+    return DualSolutions(np.stack(zs), set_number.ravel(), np.stack(mus), per_pressure)
 
 
 def _on_groups(factored: FactoredSolution, groups: GoalGroups, goals: Sequence[Goal]) -> Floats:
@@ -282,9 +282,9 @@ def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -
     for end in ends:
         changes = []
         for group in (order[end], order[end + 1]):
-            other = is_active.copy()
-            other[group] = ~other[group]
-            pressure_change = of_set(groups.dual, gap_without_group, other)[0] - pressure
+            is_active_then = is_active.copy()
+            is_active_then[group] = ~is_active_then[group]
+            pressure_change = of_set(groups.dual, gap_without_group, is_active_then)[0] - pressure
             changes.append(np.abs(duals.per_pressure.T @ pressure_change))
         change_sum = changes[0] + changes[1]
         total += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)

@@ -104,9 +104,9 @@ def estimate(
                 mus[c][k] = mu
                 if mu.any():
                     r -= face_residual(w, lips, mu)
-        each = np.einsum("nim,ni->nm", r, e_u[:, :, k] + imposed_values[k])
-        eta[k] = each.sum(axis=0)
-        parts[k], by_cell[k] = each, shares(w, each).T
+        contributions = np.einsum("nim,ni->nm", r, e_u[:, :, k] + imposed_values[k])
+        eta[k] = contributions.sum(axis=0)
+        parts[k], by_cell[k] = contributions, shares(w, contributions).T
         if groups is not None:
             end[k] = end_changes(groups, dual, groups.N @ solution.u, solution.number)
     numbers = [s.number for s in solutions]

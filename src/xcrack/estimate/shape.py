@@ -102,7 +102,7 @@ def crack_shape(
     )
     bluntness = np.minimum(turn[moved_points] / _BLUNT, 1.0)
     has_traction = pressure.any(axis=1) | np.any(
-        [each[moved_points].any(axis=1) for each in mu], axis=0
+        [mu_of_state[moved_points].any(axis=1) for mu_of_state in mu], axis=0
     )
     smooth_parts = (1 - bluntness)[:, None, None] * parts
     cells = lips.weight / space.mesh.cell_size[lips.cell[:, 0]]
@@ -163,24 +163,24 @@ def gap_changes(
     change, by_zone = np.zeros((len(solutions), m)), np.zeros((len(_GAPS), len(solutions), m))
     by_cell = np.zeros((len(solutions), m, len(space.mesh.cells)))
     for k, solution in enumerate(solutions):
-        for other, contact in enumerate(solution.contact):
+        for crack, contact in enumerate(solution.contact):
             if contact is not None and contact.shear is not None:
                 continue
-            lips, is_pressed = solution.lips[other], np.zeros(len(solution.lips[other]), dtype=bool)
+            lips, is_pressed = solution.lips[crack], np.zeros(len(solution.lips[crack]), dtype=bool)
             if contact is not None:
                 is_pressed = np.asarray(contact.closed) & (np.asarray(contact.pressure) > 0)
-            rows = np.nonzero(is_pressed | _are_overlapping(solution, other))[0]
+            rows = np.nonzero(is_pressed | _are_overlapping(solution, crack))[0]
             if not len(rows):
                 continue
             columns = _columns([solution], known_error.z[[k]])
             cell, x = lips.cell[rows, 0], lips.x[rows]
             size = space.mesh.cell_size[cell]
-            gap = _gaps(space, columns, other, lips, rows)
-            if other == c:
+            gap = _gaps(space, columns, crack, lips, rows)
+            if crack == c:
                 gap[:, 1:] -= _opening_of(singular_fields()[0][:, rows], lips.normal[rows])
             modulus = solution.problem.elasticity.moduli_of_cells[cell]
             part = (modulus * lips.weight[rows] / size * gap[:, 0])[:, None] * gap[:, 1:]
-            bends = _locking_points(space.cracks[other].points, float(size.mean()))
+            bends = _locking_points(space.cracks[crack].points, float(size.mean()))
             is_open = ~is_pressed[rows]
             at_junction = _is_near(x, places, _REACH * size) & ~is_open
             at_turn = _is_near(x, bends, _REACH * size) & ~at_junction & ~is_open
@@ -222,14 +222,14 @@ def load_changes(
         As `singular_part` of `crack_shape`, on faces of crack c that are given by points.
     """
     space, change = solutions[0].space, np.zeros((len(solutions), z.shape[2]))
-    for other, lips in enumerate(solutions[0].lips):
-        if not any(np.ptp(given_pressure(s, other, lips.x)) > 0 for s in solutions):
+    for crack, lips in enumerate(solutions[0].lips):
+        if not any(np.ptp(given_pressure(s, crack, lips.x)) > 0 for s in solutions):
             continue
-        for faces, sign in ((lips, -1.0), (lip_points(space, other, _DENSE), 1.0)):
-            singular_gap = _opening_of(singular_on(faces)[0], faces.normal) if other == c else 0.0
+        for faces, sign in ((lips, -1.0), (lip_points(space, crack, _DENSE), 1.0)):
+            singular_gap = _opening_of(singular_on(faces)[0], faces.normal) if crack == c else 0.0
             for k, solution in enumerate(solutions):
-                gap = _gaps(space, _columns([solution], z[[k]]), other, faces)[:, 1:] - singular_gap
-                force = sign * faces.weight * given_pressure(solution, other, faces.x)
+                gap = _gaps(space, _columns([solution], z[[k]]), crack, faces)[:, 1:] - singular_gap
+                force = sign * faces.weight * given_pressure(solution, crack, faces.x)
                 change[k] += force @ gap
     return change
 
@@ -286,8 +286,8 @@ def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]
     facets, sagitta = _chords(mesh)
     if len(facets) and sides:
         curved_numbers = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
-        other = ~np.isin(mesh.facet_numbers(facets), curved_numbers)
-        facets, sagitta = facets[other], sagitta[other]
+        has_no_curve = ~np.isin(mesh.facet_numbers(facets), curved_numbers)
+        facets, sagitta = facets[has_no_curve], sagitta[has_no_curve]
     if not len(facets):
         return shape_terms, np.zeros_like(shape_terms)
     points, _ = facet_points(solutions[0].space, facets, 3)
@@ -313,15 +313,15 @@ def _nearest_on(polyline: Floats, x: Floats) -> tuple[Floats, Floats, Floats, Fl
     t = np.einsum("qsd,sd->qs", x[:, None] - a, segment) / (segment * segment).sum(axis=1)
     t = np.clip(t, 0.0, 1.0)
     foot = a + t[..., None] * segment
-    best = np.linalg.norm(x[:, None] - foot, axis=2).argmin(axis=1)
+    leg = np.linalg.norm(x[:, None] - foot, axis=2).argmin(axis=1)
     row = np.arange(len(x))
     heading = np.unwrap(np.arctan2(segment[:, 1], segment[:, 0]))
     turn = np.concatenate([[0.0], np.abs(np.diff(heading)), [0.0]])
     normal = np.stack([-segment[:, 1], segment[:, 0]], axis=1)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     length = np.linalg.norm(segment, axis=1)
-    way = (np.cumsum(length) - length)[best] + t[row, best] * length[best]
-    return foot[row, best], turn[best + (t[row, best] > 0.5)], normal[best], way
+    way = (np.cumsum(length) - length)[leg] + t[row, leg] * length[leg]
+    return foot[row, leg], turn[leg + (t[row, leg] > 0.5)], normal[leg], way
 
 
 def _along_normal(way: Floats, normal: Floats) -> Floats:
@@ -375,19 +375,19 @@ def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
     heading = np.arctan2(chord[:, 1], chord[:, 0])
     previous_facet, next_facet = facet_to_begin[ends[:, 0]], facet_from_end[ends[:, 1]]
 
-    def turn(first: Ints, second: Ints) -> Floats:
-        difference = heading[second] - heading[first]
+    def turn(from_facet: Ints, to_facet: Ints) -> Floats:
+        difference = heading[to_facet] - heading[from_facet]
         return np.asarray((difference + np.pi) % (2 * np.pi) - np.pi)
 
     facet_numbers = np.arange(len(ends))
-    low, high = turn(previous_facet, facet_numbers), turn(facet_numbers, next_facet)
+    t0, t1 = turn(previous_facet, facet_numbers), turn(facet_numbers, next_facet)
     smaller_turn, larger_turn = (
-        np.minimum(np.abs(low), np.abs(high)),
-        np.maximum(np.abs(low), np.abs(high)),
+        np.minimum(np.abs(t0), np.abs(t1)),
+        np.maximum(np.abs(t0), np.abs(t1)),
     )
-    is_curved = (previous_facet >= 0) & (next_facet >= 0) & (low * high > 0) & (smaller_turn > 1e-6)
+    is_curved = (previous_facet >= 0) & (next_facet >= 0) & (t0 * t1 > 0) & (smaller_turn > 1e-6)
     is_curved &= (larger_turn < _ROUND) & (larger_turn < _ALIKE * smaller_turn)
     length = np.linalg.norm(chord, axis=1)
     # An arc that turns by t over a chord of length L lies L t / 12 outside of it in the mean.
-    sagitta = (low + high) / 2 * length / 12
+    sagitta = (t0 + t1) / 2 * length / 12
     return ends[is_curved], sagitta[is_curved]

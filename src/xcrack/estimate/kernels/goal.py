@@ -44,18 +44,18 @@ def _bend(M, r, c, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def _factor(  # type: ignore[no-untyped-def]
-    x, y, is_behind, side, weight, outer, inner, frame, modes, lam, mu, change, result
+    x, y, is_behind, side, weight, r_outer, r_inner, frame, modes, lam, mu, change, result
 ):  # fmt: skip
     """Set the factors (2, 2, 2) of one point; False where there are none.
 
     The change of the stiffness from that of the tip (3, 3) counts unless it is None.
     """
     r = math.sqrt(x * x + y * y)
-    if r >= outer or (r <= inner and change is None) or r == 0.0:
+    if r >= r_outer or (r <= r_inner and change is None) or r == 0.0:
         return False
     c, s = _half_angle(x, y, r, is_behind, side)
-    width = outer - inner
-    z = (r - inner) / width
+    width = r_outer - r_inner
+    z = (r - r_inner) / width
     if change is not None:
         z = max(z, 0.0)
     fall = -30.0 * z * z * (1.0 - z) * (1.0 - z) / (width * r) * weight
@@ -96,16 +96,17 @@ def _factor(  # type: ignore[no-untyped-def]
             f01 += shear
             f10 += shear
         for i in range(2):
-            first = frame[0, i] * f00 + frame[1, i] * f10
-            second = frame[0, i] * f01 + frame[1, i] * f11
+            f_along = frame[0, i] * f00 + frame[1, i] * f10
+            f_across = frame[0, i] * f01 + frame[1, i] * f11
             for j in range(2):
-                result[i, j, m] = first * frame[0, j] + second * frame[1, j]
+                result[i, j, m] = f_along * frame[0, j] + f_across * frame[1, j]
     return True
 
 
 @kernel
 def ring_factors(  # type: ignore[no-untyped-def]
-    cell, bary, side, weight, points, cells, psi, tip, outer, inner, frame, modes, lam, mu, change
+    cell, bary, side, weight, points, cells, psi, tip, r_outer, r_inner, frame, modes, lam, mu,
+    change,
 ):  # fmt: skip
     """Factors B of the displacement gradient in the domain integrals of modes I and II.
 
@@ -121,8 +122,8 @@ def ring_factors(  # type: ignore[no-untyped-def]
     points, cells : (n, 2) and (m, 3) arrays
     psi : (n,) array
     tip : (2,) array, length
-    outer, inner : float, length
-        The weight q falls from one to zero by a quintic between inner and outer.
+    r_outer, r_inner : float, length
+        The weight q falls from one to zero by a quintic between `r_inner` and `r_outer`.
     frame : (2, 2) array
     modes : (2, 2, 4) array
         Displacements of modes I and II by tip function.
@@ -146,7 +147,7 @@ def ring_factors(  # type: ignore[no-untyped-def]
             psi_sum += psi[node]
         x, y = frame[0, 0] * dx + frame[0, 1] * dy, frame[1, 0] * dx + frame[1, 1] * dy
         _factor(
-            x, y, psi_sum < 0.0, side[p], weight[p], outer, inner, frame, modes, lam, mu,
+            x, y, psi_sum < 0.0, side[p], weight[p], r_outer, r_inner, frame, modes, lam, mu,
             None if change is None else change[p], result[p],
         )  # fmt: skip
     return result
@@ -154,14 +155,14 @@ def ring_factors(  # type: ignore[no-untyped-def]
 
 @kernel
 def plain_ring(  # type: ignore[no-untyped-def]
-    chosen, points, cells, slopes, volume, side, psi, bary, share, tip, outer, inner, frame, modes,
-    lam, mu, change,
+    plain_cells, points, cells, slopes, volume, side, psi, bary, share, tip, r_outer, r_inner,
+    frame, modes, lam, mu, change,
 ):  # fmt: skip
     """The same integrals over plain cells, with each shape and surplus function of order 2.
 
     Parameters
     ----------
-    chosen : (k,) array of int
+    plain_cells : (k,) array of int
     points, cells, slopes, volume : arrays
         Of the mesh; slopes are those of the barycentric coordinates.
     side : (m,) array of int
@@ -170,9 +171,9 @@ def plain_ring(  # type: ignore[no-untyped-def]
     bary, share : (q, 3) and (q,) arrays
         Points of a cell and their share of its volume.
     tip : (2,) array, length
-    outer, inner, frame, modes, lam, mu : as in `ring_factors`
+    r_outer, r_inner, frame, modes, lam, mu : as in `ring_factors`
     change : (k, q or 1, 3, 3) array or None
-        As in `ring_factors`, of the chosen cells: at their points, or the same at all of them.
+        As in `ring_factors`, of the plain cells: at their points, or the same at all of them.
 
     Returns
     -------
@@ -183,10 +184,10 @@ def plain_ring(  # type: ignore[no-untyped-def]
     turn : (2,) array
         Integral of B_12 - B_21 of each mode.
     """
-    of_nodes, of_tips = np.zeros((len(chosen), 6, 2, 2)), np.zeros((len(chosen), 4, 2, 2))
+    of_nodes, of_tips = np.zeros((len(plain_cells), 6, 2, 2)), np.zeros((len(plain_cells), 4, 2, 2))
     turn, B, d = np.zeros(2), np.empty((2, 2, 2)), np.empty((10, 2))
-    for k in range(len(chosen)):
-        e = chosen[k]
+    for k in range(len(plain_cells)):
+        e = plain_cells[k]
         G = slopes[e]
         is_behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
         for p in range(len(share)):
@@ -195,7 +196,7 @@ def plain_ring(  # type: ignore[no-untyped-def]
                 dx += bary[p, b] * points[cells[e, b], 0]
                 dy += bary[p, b] * points[cells[e, b], 1]
             square = dx * dx + dy * dy
-            if square >= outer * outer or (change is None and square <= inner * inner):
+            if square >= r_outer * r_outer or (change is None and square <= r_inner * r_inner):
                 continue
             x, y = frame[0, 0] * dx + frame[0, 1] * dy, frame[1, 0] * dx + frame[1, 1] * dy
             if not _factor(
@@ -204,8 +205,8 @@ def plain_ring(  # type: ignore[no-untyped-def]
                 is_behind,
                 side[e],
                 share[p] * volume[e],
-                outer,
-                inner,
+                r_outer,
+                r_inner,
                 frame,
                 modes,
                 lam,

@@ -69,9 +69,9 @@ def add_functional(residual, cell, bary, side, factor, functions, sign, copy, cr
             _slopes(bary[q], gradient[e], sign[e], slope)
             for i in range(2):
                 for m in range(factor.shape[3]):
-                    first, second = factor[q, i, 0, m], factor[q, i, 1, m]
+                    factor_x, factor_y = factor[q, i, 0, m], factor[q, i, 1, m]
                     for a in range(4):
-                        part[i, m, a] += first * slope[a, 0] + second * slope[a, 1]
+                        part[i, m, a] += factor_x * slope[a, 0] + factor_y * slope[a, 1]
         if not _is_same_side(cell, side, q):
             _hand_over(part, residual, functions[e], copy, crack, side[q])
 
@@ -224,13 +224,13 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
         for a in range(4):
             f = functions[e, a]
             for m in range(columns):
-                first, second = 0.0, 0.0
+                residual_x, residual_y = 0.0, 0.0
                 for c in range(3):
                     x, y = displaced[a, c, 0], displaced[a, c, 1]
-                    first += stress[m, c, 0] * x + stress[m, c, 2] * y
-                    second += stress[m, c, 2] * x + stress[m, c, 1] * y
-                residual[f, 0, m] -= first
-                residual[f, 1, m] -= second
+                    residual_x += stress[m, c, 0] * x + stress[m, c, 2] * y
+                    residual_y += stress[m, c, 2] * x + stress[m, c, 1] * y
+                residual[f, 0, m] -= residual_x
+                residual[f, 1, m] -= residual_y
             x2, y2, xy = 0.0, 0.0, 0.0
             for b in range(3):
                 for c in range(3):
