@@ -87,11 +87,11 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, faults: list[str
         )
     if (rate[dK == 0] != 0).any():
         faults.append("da/dN is not 0 for dK_eq = 0: a crack without load would grow")
-    largest = np.abs(rate[np.isfinite(rate)]).max(initial=0.0)
+    scale = np.abs(rate[np.isfinite(rate)]).max(initial=0.0)
     table = rate.reshape(9, -1)
     n = table.shape[1]
     # inf to inf is no fall, inf to a number is one
-    falls = table[1:] < np.where(np.isinf(table[:-1]), np.inf, table[:-1] - _ROUND_OFF * largest)
+    falls = table[1:] < np.where(np.isinf(table[:-1]), np.inf, table[:-1] - _ROUND_OFF * scale)
     if falls.any():
         i, j = np.argwhere(falls)[0]
         faults.append(
@@ -100,11 +100,11 @@ def _check_rates(law: Law, dK: Floats, R: Floats, rate: Floats, faults: list[str
     single_rates = [
         _call_law(law, (dK[i : i + 1], R[i : i + 1]), faults, "da/dN") for i in range(len(dK))
     ]
-    if any(one is None or one.size != 1 for one in single_rates):
+    if any(point_rate is None or point_rate.size != 1 for point_rate in single_rates):
         faults.append("for one point it does not return one rate")
         return
-    one = np.array([each.reshape(-1)[0] for each in single_rates])
-    if not np.allclose(one, rate, rtol=_ROUND_OFF, atol=0):
+    point_rates = np.array([point_rate.reshape(-1)[0] for point_rate in single_rates])
+    if not np.allclose(point_rates, rate, rtol=_ROUND_OFF, atol=0):
         faults.append(
             "a point alone gets another rate than among others: each must stand for itself"
         )
