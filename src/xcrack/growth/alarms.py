@@ -72,50 +72,50 @@ def _solutions(rule: GrowthRule, step: Step) -> tuple[Solution, ...]:
     return step.solutions if rule.response is None else ()
 
 
-def alarm_of_life(rule: GrowthRule, last: Step, end: str) -> Alarm | None:
+def alarm_of_life(rule: GrowthRule, step: Step, end: str) -> Alarm | None:
     """A life that is too short for fatigue, in a scene with units.
 
     A run that ends at its first step has said why.
     """
     cycles, has_stopped_by_itself = (
-        last.cycles,
+        step.cycles,
         end.startswith(("max_", "rate is zero", "the advance")),
     )
-    if has_stopped_by_itself or last.index == 0 or not has_units(rule.problem) or cycles >= _FEW:
+    if has_stopped_by_itself or step.index == 0 or not has_units(rule.problem) or cycles >= _FEW:
         return None
     remedy = "is the law in the units of the model, and are the loads as meant?"
     return Alarm("the number of cycles until the run ended", cycles, _FEW, "", remedy)
 
 
-def alarm_of_energy(rule: GrowthRule, last: Step, step: Step) -> Alarm | None:
+def alarm_of_energy(rule: GrowthRule, last_step: Step, step: Step) -> Alarm | None:
     """A step whose solution does not release the energy that K says: two ways to one number.
 
     Asked where loads are dead, so that the strain energy grows by G times the new area, where there
     is no friction, and where the cracks have grown by a tenth. Not where some join or leave: their
     ends are no longer there to say what they released.
     """
-    if not (_has_dead_loads(rule) and last.solutions and step.solutions and step.sif):
+    if not (_has_dead_loads(rule) and last_step.solutions and step.solutions and step.sif):
         return None
-    if step.joins or step.arrivals or len(step.cracks) != len(last.cracks):
+    if step.joins or step.arrivals or len(step.cracks) != len(last_step.cracks):
         return None
     mesh = rule.problem.mesh
-    old_area, area = (crack_areas(each.cracks, mesh) for each in (last, step))
+    old_area, area = (crack_areas(s.cracks, mesh) for s in (last_step, step))
     if area.sum() < (1 + _LEAST_GROWTH) * old_area.sum():
         return None
-    old_G, G = _release(last), _release(step)
+    old_G, G = _release(last_step), _release(step)
     if old_G is None or G is None:
         return None
     # The geometric mean: less than the true one where G grows like a power or an exponential, as
     # over most of a ligament in one step, of which the arithmetic mean makes 2.5 times as much.
     by_K = float(np.sqrt(old_G * G) @ (area - old_area))
-    ratio = (step.solutions[-1].energy - last.solutions[-1].energy) / by_K if by_K > 0 else 1.0
+    ratio = (step.solutions[-1].energy - last_step.solutions[-1].energy) / by_K if by_K > 0 else 1.0
     if ratio >= _BALANCED:
         return None
     return Alarm(
         "the energy that the step releases over G times the new area", ratio, _BALANCED,
-        f"from step {last.index} to {step.index}", "faces of the crack lie over each other, or the "
-        "cells are too coarse where fronts turn or meet: look at the faces with plot, and take "
-        "shorter steps in smaller cells.",
+        f"from step {last_step.index} to {step.index}", "faces of the crack lie over each other, "
+        "or the cells are too coarse where fronts turn or meet: look at the faces with plot, and "
+        "take shorter steps in smaller cells.",
     )  # fmt: skip
 
 
@@ -149,15 +149,15 @@ def _factors(rule: GrowthRule) -> list[Alarm]:
     spectrum = rule.cycle
     if not isinstance(spectrum, Spectrum) or spectrum.states is not None:
         return []
-    largest = max(map(abs, spectrum.extremes))
+    largest_factor = max(map(abs, spectrum.extremes))
     loads = [(_stress_of(load), load) for load in rule.problem.loads]
     stress, load = max(loads, key=lambda pair: pair[0], default=(0.0, None))
-    if largest <= _SCALED or stress < _STRESS or load is None:
+    if largest_factor <= _SCALED or stress < _STRESS or load is None:
         return []
     return [
         Alarm(
             "the largest factor of the spectrum",
-            largest,
+            largest_factor,
             _SCALED,
             f"beside {load.name} of {stress:.4g}",
             "factors multiply the loads: are they stresses already? Then give unit loads, or "
@@ -175,14 +175,14 @@ def _cycles_of_block(spectrum: Spectrum) -> float:
 
 def _stress_of(load: Load) -> float:
     """Largest number of a load that is a stress; 0 where it has none, or a function."""
-    largest = 0.0
+    stress = 0.0
     for name, argument in arguments_of(type(load)).items():
         value = getattr(load, name)
         unit = None if argument.rule is None else argument.rule.unit
         if (unit(load) if callable(unit) else unit) == STRESS and not callable(value):
             components = np.asarray(value, dtype=object).ravel()
-            largest = max([largest, *(abs(float(v)) for v in components if v is not None)])
-    return largest
+            stress = max([stress, *(abs(float(v)) for v in components if v is not None)])
+    return stress
 
 
 def _rate(rule: GrowthRule, step: Step) -> list[Alarm]:
@@ -229,10 +229,10 @@ def _no_growth(rule: GrowthRule, step: Step, units: str) -> list[Alarm]:
     energy = max(solution.energy for solution in solutions)
     stress = np.sqrt(2 * max(energy, 0.0) * E_prime / mesh.volume.sum())
     length = float(np.ptp(mesh.points, axis=0).max())
-    largest = float(stress * np.sqrt(np.pi * length))
+    K_scale = float(stress * np.sqrt(np.pi * length))
     R = next(R[[0]] for R in step.R if len(R))
     for factor in _REACH:
-        dK = np.array([factor * largest])
+        dK = np.array([factor * K_scale])
         try:
             rate = evaluate_law(rule.law, dK, R, 0, GEOMETRY[mesh.dim].station, np.array([length]))
         except XcrackError:  # beyond what its constants were fitted for
@@ -243,7 +243,7 @@ def _no_growth(rule: GrowthRule, step: Step, units: str) -> list[Alarm]:
         return []
     words = f"K of a crack as long as the body is no larger, and nothing can grow: {units}"
     quantity = "dK_eq up to which there is no growth"
-    return [Alarm(quantity, float(factor * largest), largest, "", words)]
+    return [Alarm(quantity, float(factor * K_scale), K_scale, "", words)]
 
 
 __all__ = ["alarm_of_energy", "alarm_of_life", "alarms_of_step", "validity_of"]

@@ -88,20 +88,20 @@ def _with_cells(first_rule: GrowthRule, cells: CellSizes | None, meshes: int) ->
     return replace(first_rule, cells=cells, meshes=meshes)
 
 
-def follow(first_rule: GrowthRule, rule: GrowthRule, last: Step) -> GrowthRule:
+def follow(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
     """The run on the mesh of the next step, whose ends are where the plan of the last one leads.
 
     Parameters
     ----------
     first_rule, rule : GrowthRule
         On the mesh that it begins with, and on that of the last step.
-    last : Step
+    step : Step
     """
     cells = rule.cells
     if cells is None or not cells.moves.any():
         return rule
     try:
-        x = replace(rule.problem, cracks=plan_of(last).cracks).stations.x
+        x = replace(rule.problem, cracks=plan_of(step).cracks).stations.x
     except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
         return rule
     if not len(x):
@@ -155,10 +155,11 @@ def refine_cells(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> Growth
         )  # fmt: skip
         if error <= target:
             break
-        other = _with_cells(
+        new_rule = _with_cells(
             first_rule, dimension.cells(rule.cells, indicators, target * indicators.scale), meshes
         )
-        n_cells_before, n_cells_after = len(rule.problem.mesh.cells), len(other.problem.mesh.cells)
+        n_cells_before = len(rule.problem.mesh.cells)
+        n_cells_after = len(new_rule.problem.mesh.cells)
         if unknowns * n_cells_after > most_unknowns * n_cells_before:
             warn(
                 f"grow: the mesh that tolerance = {tolerance:g} asks for would have more than "
@@ -167,7 +168,7 @@ def refine_cells(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> Growth
                 "max_unknowns; life_bar says what it costs."
             )
             return replace(rule, meshes=_MOST)
-        rule = other
+        rule = new_rule
         if error <= _FORETOLD * target or n_cells_after == n_cells_before:
             break
     return replace(rule, meshes=meshes)
@@ -286,7 +287,7 @@ _SHORT = 1.3  # times a first step: the shortest that cells at kinks may allow
 
 
 def plan_again(
-    first_rule: GrowthRule, rule: GrowthRule, last: Step | None, step: Step
+    first_rule: GrowthRule, rule: GrowthRule, last_step: Step | None, step: Step
 ) -> tuple[GrowthRule, Step | None] | None:
     """The run and the step from which one is to be computed again; None where that is good.
 
@@ -296,38 +297,38 @@ def plan_again(
     ----------
     first_rule, rule : GrowthRule
         On the mesh that it begins with, and on that of the step.
-    last : Step or None
+    last_step : Step or None
         The one before, which is handed over.
     step : Step
     """
-    other = _finer_at_kinks(first_rule, rule, step) if last is None else None
-    if other is not None:
-        return other, None
-    shorter_step = None if last is None else _step_before(last, step)
+    new_rule = _finer_at_kinks(first_rule, rule, step) if last_step is None else None
+    if new_rule is not None:
+        return new_rule, None
+    shorter_step = None if last_step is None else _step_before(last_step, step)
     if shorter_step is not None:  # what the mesh leaves to be wished is seen on a step that stays
         return rule, shorter_step
-    if not _is_mesh_too_coarse(rule, last, step):
+    if not _is_mesh_too_coarse(rule, last_step, step):
         return None
-    cells = _cells_for_room(rule, last) if _has_no_bar(step) else None
+    cells = _cells_for_room(rule, last_step) if _has_no_bar(step) else None
     if cells is not None:
-        other = _with_cells(first_rule, cells, rule.meshes + 1)
+        new_rule = _with_cells(first_rule, cells, rule.meshes + 1)
     elif _ends_soon(rule, step):
         return None
     else:
-        other = refine_cells(first_rule, rule, step)
-    return other, last if last is None else _with_room(rule, other, last, step)
+        new_rule = refine_cells(first_rule, rule, step)
+    return new_rule, last_step if last_step is None else _with_room(rule, new_rule, last_step, step)
 
 
-def _step_before(last: Step, step: Step) -> Step | None:
+def _step_before(last_step: Step, step: Step) -> Step | None:
     """The step before one whose error is too large, with a shorter way ahead; None if that is not.
 
     It follows from what is stored with both: a run that is taken up again does the same.
     """
-    error, control = step.control.error, last.control
+    error, control = step.control.error, last_step.control
     if error is None or error <= REJECTED or not control.can_shorten:
         return None
     length = next_length(control.length, error, None, control.least)
-    return replace(last, control=replace(control, length=length))
+    return replace(last_step, control=replace(control, length=length))
 
 
 def _ends_soon(rule: GrowthRule, step: Step) -> bool:
@@ -368,12 +369,12 @@ def _finer_at_kinks(first_rule: GrowthRule, rule: GrowthRule, first: Step) -> Gr
     return _with_cells(first_rule, CellSizes(stations.x, sizes, stay), rule.meshes + 1)
 
 
-def _cells_for_room(rule: GrowthRule, last: Step | None) -> CellSizes | None:
+def _cells_for_room(rule: GrowthRule, step: Step | None) -> CellSizes | None:
     """Smaller cells where tips of the next step have too little room; None where they have it."""
-    if last is None or rule.problem.mesh.dim == 3:
+    if step is None or rule.problem.mesh.dim == 3:
         return None
     try:
-        place, size = tip_sizes(replace(rule.problem, cracks=plan_of(last).cracks))
+        place, size = tip_sizes(replace(rule.problem, cracks=plan_of(step).cracks))
     except GeometryError:
         return None
     if (cell_sizes(rule.problem.mesh, place) <= size).all():
@@ -384,23 +385,23 @@ def _cells_for_room(rule: GrowthRule, last: Step | None) -> CellSizes | None:
     return cells.with_ends(place, np.minimum(size, cells.size_at(place)))
 
 
-def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool:
+def _is_mesh_too_coarse(rule: GrowthRule, last_step: Step | None, step: Step) -> bool:
     """Whether the bars of K are too wide on the mesh of a step, or its cells too long."""
     error = step.error
     if not rule.estimates or error is None or not step.n_tips or rule.meshes >= _MOST:
         return False
-    meshes_before = 0 if last is None else run_state(last).meshes
+    meshes_before = 0 if last_step is None else run_state(last_step).meshes
     if rule.meshes > meshes_before or (rule.meshes and step.index < _SETTLED):
         return False  # it was made for this step, or for a kink just behind it
     tolerance = float(rule.tolerance or 0.0)
     forgiven_factor = 1.0 if rule.meshes == 0 else _FORGIVEN
     rate, turn = _errors_of_step(step)
-    if rule.meshes and _has_no_bar(step) and _cells_for_room(rule, last) is None:
+    if rule.meshes and _has_no_bar(step) and _cells_for_room(rule, last_step) is None:
         return False
-    if rule.meshes and last is not None and not _has_no_bar(step):
-        rate, turn = map(min, (rate, turn), _errors_of_step(last))
+    if rule.meshes and last_step is not None and not _has_no_bar(step):
+        rate, turn = map(min, (rate, turn), _errors_of_step(last_step))
     of_life, of_path = SHARE * tolerance, (1 - PATH) * tolerance
-    if last is None:
+    if last_step is None:
         return rate > _BEGIN * of_life or turn > _BEGIN_OF_PATH * of_path
     cycles, way = step.cycles, max(error.grown, _SIZE * min(step.sizes, default=0.0))
     if not (cycles > 0 and way > 0):
@@ -412,7 +413,7 @@ def _is_mesh_too_coarse(rule: GrowthRule, last: Step | None, step: Step) -> bool
     return bool(
         (rate > forgiven_factor * of_life and short_of_life and life / cycles > _WHOLE * tolerance)
         or (turn > forgiven_factor * of_path and short_of_path and path / way > _WHOLE * tolerance)
-        or (rule.meshes == 0 and _has_no_room(last, step))
+        or (rule.meshes == 0 and _has_no_room(last_step, step))
     )
 
 
@@ -421,28 +422,28 @@ _MARGIN = 0.5  # of what K may take of a tolerance: bars that are foretold may b
 _STRAIGHT = 0.2  # rad, most that a path turns by on the way to a solve with foretold bars
 
 
-def bars_are_foretold(rule: GrowthRule, last: Step) -> bool:
+def bars_are_foretold(rule: GrowthRule, step: Step) -> bool:
     """Whether the bars of K at the next solve may follow from those of the last one.
 
     In 2D under a cycle, between solves that have their own: where these leave a margin, the mesh
     stays, and the path is smooth. It follows from what is stored with the step: a run that is
     resumed does the same.
     """
-    error, index = last.error, last.index + 1
+    error, index = step.error, step.index + 1
     if error is None or rule.problem.mesh.dim == 3:
         return False
-    if index < _FIRST or index % _MEASURED == 0 or run_state(last).meshes != rule.meshes:
+    if index < _FIRST or index % _MEASURED == 0 or run_state(step).meshes != rule.meshes:
         return False
-    if not isinstance(rule.cycle, Cycle) or rule.load_program is not None or last.joins:
+    if not isinstance(rule.cycle, Cycle) or rule.load_program is not None or step.joins:
         return False
-    plan = plan_of(last)
+    plan = plan_of(step)
     if plan.joins or any(crack.ends_on for crack in plan.cracks):
         return False
-    largest = max((float(np.abs(angle).max(initial=0.0)) for angle in last.angle), default=0.0)
-    if largest > _STRAIGHT or not np.isfinite(error.rate):
+    max_angle = max((float(np.abs(angle).max(initial=0.0)) for angle in step.angle), default=0.0)
+    if max_angle > _STRAIGHT or not np.isfinite(error.rate):
         return False
     allowance = _MARGIN * float(rule.tolerance or 0.0)
-    rate, turn = _errors_of_step(last)
+    rate, turn = _errors_of_step(step)
     return rate <= SHARE * allowance and turn <= (1 - PATH) * allowance
 
 
@@ -454,22 +455,22 @@ def _errors_of_step(step: Step) -> tuple[float, float]:
     return TOGETHER * error.rate, error.turn
 
 
-def _has_no_room(last: Step, step: Step) -> bool:
+def _has_no_room(last_step: Step, step: Step) -> bool:
     """Whether a step is too long, and the cells leave no room for a shorter one."""
     error = step.control.error
-    return error is not None and error > REJECTED and not last.control.can_shorten
+    return error is not None and error > REJECTED and not last_step.control.can_shorten
 
 
-def _with_room(rule: GrowthRule, other: GrowthRule, last: Step, step: Step) -> Step:
+def _with_room(rule: GrowthRule, new_rule: GrowthRule, last_step: Step, step: Step) -> Step:
     """The step before, with the way ahead that a finer mesh allows."""
     places = np.concatenate([sif.x for sif in step.sif[0]])
-    sizes = [cell_sizes(each.problem.mesh, places) for each in (rule, other)]
-    control, error = last.control, step.control.error
+    sizes = [cell_sizes(r.problem.mesh, places) for r in (rule, new_rule)]
+    control, error = last_step.control, step.control.error
     least_length = control.least * min(float(np.median(sizes[1] / sizes[0])), 1.0)
     length = control.length
     if error is not None and error > REJECTED:
         length = next_length(length, error, None, least_length)
-    return replace(last, control=replace(control, length=length, least=least_length))
+    return replace(last_step, control=replace(control, length=length, least=least_length))
 
 
 __all__ = [

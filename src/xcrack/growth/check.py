@@ -76,8 +76,8 @@ def check(
     >>> [(alarm.quantity, alarm.limit) for alarm in alarms]
     [('K over the toughness K_c', 1.0)]
     """
-    chosen = da is not None or "cycles" in options or "tolerance" in options
-    run = run_of("check", problem, law, criterion, cycle, da if chosen else _ANY, options)
+    has_length = da is not None or "cycles" in options or "tolerance" in options
+    run = run_of("check", problem, law, criterion, cycle, da if has_length else _ANY, options)
     with collected_warnings([]):  # those of K are not what is asked for
         step = first_step(replace(run, tolerance=None, max_unknowns=None, da=_ANY))
     return tuple(alarms_of_step(run, step))

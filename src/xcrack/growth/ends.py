@@ -41,7 +41,7 @@ class Ligament:
     length : float
     tip : (int, int)
         Crack and number.
-    other : (int, int), optional
+    second_tip : (int, int), optional
         The other tip, where both head for each other.
     name : str
         Facet set or crack that the tip heads for; empty between two tips.
@@ -49,7 +49,7 @@ class Ligament:
 
     length: float
     tip: _Place
-    other: _Place | None
+    second_tip: _Place | None
     name: str
 
 
@@ -83,7 +83,7 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     filled_shares = _filled_shares(rule, step)
     if not filled_shares:
         return ""
-    share, one = max(filled_shares, key=lambda each: each[0])
+    share, ligament = max(filled_shares, key=lambda pair: pair[0])
     if share < 1:
         return ""
     zone = [_zones(rule, step, c) for c in range(len(step.cracks))]
@@ -91,13 +91,13 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
     def size(place: _Place) -> float:
         return float(zone[place[0]][place[1]])
 
-    first = f"of {place_name(step, *one.tip)}, {size(one.tip):.4g}"
-    if one.other is None:
-        what = f"the plastic zone {first}, fills the {one.length:.4g} to {one.name}"
+    first = f"of {place_name(step, *ligament.tip)}, {size(ligament.tip):.4g}"
+    if ligament.second_tip is None:
+        what = f"the plastic zone {first}, fills the {ligament.length:.4g} to {ligament.name}"
     else:
         what = (
-            f"the plastic zones {first}, and of {place_name(step, *one.other)}, "
-            f"{size(one.other):.4g}, fill the {one.length:.4g} between them"
+            f"the plastic zones {first}, and of {place_name(step, *ligament.second_tip)}, "
+            f"{size(ligament.second_tip):.4g}, fill the {ligament.length:.4g} between them"
         )
     return f"ligament yield: {what}"
 
@@ -108,12 +108,12 @@ def _filled_shares(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]
         return []
     zone = [_zones(rule, step, c) for c in range(len(step.cracks))]
     result = []
-    for one in ligaments(rule, step):
-        c, j = one.tip
+    for ligament in ligaments(rule, step):
+        c, j = ligament.tip
         size = float(zone[c][j])
-        if one.other is not None:
-            size += float(zone[one.other[0]][one.other[1]])
-        result.append((size / one.length, one))
+        if ligament.second_tip is not None:
+            size += float(zone[ligament.second_tip[0]][ligament.second_tip[1]])
+        result.append((size / ligament.length, ligament))
     return result
 
 
@@ -237,12 +237,12 @@ def K_beyond(rule: GrowthRule, step: Step) -> float:
     """Logarithm of the largest K_eq over K_c of the material there."""
     if rule.toughness is None or step.has_left:
         return -inf
-    largest = 0.0
+    largest_share = 0.0
     for c, sif in enumerate(step.sif[0]):
         nu = rule.problem.elasticity.poisson_at(sif.x)
         share = largest_K_eq(step, c, nu) / rule.toughness_at(sif.x)
-        largest = max(largest, float(share.max(initial=0.0)))
-    return log(largest) if largest > 0 else -inf
+        largest_share = max(largest_share, float(share.max(initial=0.0)))
+    return log(largest_share) if largest_share > 0 else -inf
 
 
 def law_beyond(rule: GrowthRule, step: Step) -> float:
@@ -253,7 +253,7 @@ def law_beyond(rule: GrowthRule, step: Step) -> float:
     if step.has_left or not isinstance(rule.cycle, Cycle):
         return 1.0 if law_reaches_toughness(rule, step) else -1.0
     dK_eq, R = np.concatenate(step.dK_eq), np.concatenate(step.R)
-    low, high = -_FAR, _FAR
+    f_min, f_max = -_FAR, _FAR
     x = [sif.x for sif in step.sif[0]]
     names = rule.problem.elasticity.names_at(np.concatenate(x))
     dim = rule.problem.mesh.dim
@@ -266,14 +266,14 @@ def law_beyond(rule: GrowthRule, step: Step) -> float:
             return bool(np.isinf(rate).any())
 
     try:
-        if not breaks(high):
+        if not breaks(f_max):
             return -_FAR
         for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if breaks(middle) else (middle, high)
+            middle = 0.5 * (f_min + f_max)
+            f_min, f_max = (f_min, middle) if breaks(middle) else (middle, f_max)
     except XcrackError:  # a table ends there
         return 1.0 if law_reaches_toughness(rule, step) else -1.0
-    return -high
+    return -f_max
 
 
 def zones_beyond(rule: GrowthRule, step: Step) -> float:

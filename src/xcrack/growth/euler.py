@@ -48,28 +48,28 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     if fastest_rate == 0 or np.isinf(fastest_rate):
         return plan
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest_rate
-    largest = float(min(longest_advance(rule, step.control), by_cycles))
+    length = float(min(longest_advance(rule, step.control), by_cycles))
     score = _score(rule, step)
-    growth = stations.growth(score, largest)
+    growth = stations.growth(score, length)
     is_growing = growth >= ends.waits_below * cell
     way = np.where(is_growing, growth, 0.0)
     interfaces = ends.interfaces_ahead(rule, stations.x, way[:, None] * solves.direction[-1])
     if interfaces is not None and (way > interfaces.stop).any():  # a step ends before it, or behind
         is_beyond = way > interfaces.stop
-        largest *= float((interfaces.goal[is_beyond] / way[is_beyond]).min())
-        growth = stations.growth(score, largest)
+        length *= float((interfaces.goal[is_beyond] / way[is_beyond]).min())
+        growth = stations.growth(score, length)
         is_growing = growth >= ends.waits_below * cell
         way = np.where(is_growing, growth, 0.0)
     row = int(np.argmax(score))
     plan = replace(
         plan,
-        length=largest,
-        cycles=largest / float(rate[row]),
+        length=length,
+        cycles=length / float(rate[row]),
         arc=way,
         move=way[:, None] * solves.direction[-1],
         moves=is_growing,
         tip=row,
-        largest=largest,
+        largest=length,
     )
     return plan.with_cracks(lambda: advanced_cracks(rule, step, way))
 
@@ -83,7 +83,7 @@ def _advanced_surfaces(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]
     mesh, stations = rule.problem.mesh, solves_of(step)[0]
     angle = np.concatenate([np.zeros(0), *step.angle])
     cracks = [
-        advanced_crack(one, stations, c, angle, way, mesh) for c, one in enumerate(step.cracks)
+        advanced_crack(crack, stations, c, angle, way, mesh) for c, crack in enumerate(step.cracks)
     ]
     return place_arms(cracks, mesh)
 
@@ -126,17 +126,17 @@ def begin_at(
     identities: Identities,
     cycles: float,
     error: StepError,
-    last: Step | None = None,
+    step: Step | None = None,
 ) -> Corrected:
     """A step before which there is nothing to follow."""
-    del error, last
+    del error, step
     return _step_of_solve(rule, rates, identities, cycles, np.zeros(len(rates.stations)))
 
 
-def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) -> Corrected:
     """What the cracks after an advance mean for the cycles and for the next advance."""
-    way_since, growth_owed = _ENDS[rates.problem.mesh.dim].growth_since(rule, last, rates)
-    return _step_of_solve(rule, rates, identities, last.cycles + way_since, growth_owed)
+    way_since, growth_owed = _ENDS[rates.problem.mesh.dim].growth_since(rule, step, rates)
+    return _step_of_solve(rule, rates, identities, step.cycles + way_since, growth_owed)
 
 
 def _step_of_solve(
@@ -170,39 +170,39 @@ def cycles_until(rule: GrowthRule, step: Step, part: float, end_rate: float | No
 # Cycles of a step, by the local power law of what drives it, and growth that goes on waiting.
 
 
-def _followed_2d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Floats]:
+def _followed_2d(rule: GrowthRule, step: Step, rates: Rates) -> tuple[float, Floats]:
     """Cycles since the last step, and the growth that waits at the tips of this one.
 
     All tips together: where two cracks have become one, their numbers have changed. Their moved
     places are recognised; one that has left the body has no rate.
     """
-    stations, solves = solves_of(last)
-    moved_x = np.concatenate([moved_places(last, c) for c in range(len(last.cracks))])
+    stations, solves = solves_of(step)
+    moved_x = np.concatenate([moved_places(step, c) for c in range(len(step.cracks))])
     row = _rows_after(moved_x, rates.stations.x)
     has_row = row >= 0
     growth_owed = np.zeros(len(rates.stations))
-    growth_owed[row[has_row]] = _rest(rule, last)[has_row]
-    rate0, da = solves.rate[-1], np.concatenate(last.da)
+    growth_owed[row[has_row]] = _rest(rule, step)[has_row]
+    rate0, da = solves.rate[-1], np.concatenate(step.da)
     is_growing = (da > 0) & (rate0 > 0)
     stay = is_growing & has_row
     choice = stay if stay.any() else is_growing
     j = int(np.argmax(np.where(choice, rate0, -1.0)))
     if not has_row[j]:
         return float(da[j] / rate0[j]), growth_owed
-    interfaces = interfaces_ahead(rule, stations.x, plan_of(last).move)
+    interfaces = interfaces_ahead(rule, stations.x, plan_of(step).move)
     if interfaces is not None and da[j] > interfaces.way[j]:
-        return _cycles_across(rule, last, rates, interfaces, j, int(row[j])), growth_owed
+        return _cycles_across(rule, step, rates, interfaces, j, int(row[j])), growth_owed
     c = int(stations.crack[j])
-    a = last.sizes[c] * float(da[j] / da[stations.crack == c].sum())
+    a = step.sizes[c] * float(da[j] / da[stations.crack == c].sum())
     return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), growth_owed
 
 
 def _cycles_across(
-    rule: GrowthRule, last: Step, rates: Rates, interfaces: InterfacesAhead, j: int, row: int
+    rule: GrowthRule, step: Step, rates: Rates, interfaces: InterfacesAhead, j: int, row: int
 ) -> float:
     """Cycles of a step in which the driving tip j has passed an interface; `row` is it behind."""
-    solves, way = solves_of(last)[1], float(interfaces.way[j])
-    way_behind = float(plan_of(last).arc[j]) - way
+    solves, way = solves_of(step)[1], float(interfaces.way[j])
+    way_behind = float(plan_of(step).arc[j]) - way
     begin, end = float(solves.rate[-1, j]), float(rates.law_rate[row])
     if not 0 < end < np.inf:  # the run ends there
         cycles = np.array([way, way_behind]) / begin
@@ -210,7 +210,7 @@ def _cycles_across(
         sets = np.array(rule.problem.elasticity.sets_at(rates.stations.x))
         sets[row] = interfaces.set_before[j]
         rate_here = rates_by_law_of(rule, rates.problem, rates.response, sets)[row]
-        rate_there = rates_behind(rule, last, interfaces)[j]
+        rate_there = rates_behind(rule, step, interfaces)[j]
         rate = np.array([[begin, rate_here], [rate_there, end]])
         cycles = cycles_across(float(solves.scale[j]), way, way_behind, *rate)
     else:
@@ -218,7 +218,7 @@ def _cycles_across(
         cycles = np.array(cycles_of_jump(solves, exponent, end, j, way, way_behind, power))
     at = np.full(len(interfaces.way), np.nan)
     at[j] = cycles[0]
-    warn_of_passages(rule, last, interfaces, at)
+    warn_of_passages(rule, step, interfaces, at)
     return float(cycles.sum())
 
 
@@ -228,10 +228,10 @@ def _score(rule: GrowthRule, step: Step) -> Floats:
     return rate if rule.scaling == "law" else np.where(rate > 0, solves_of(step)[1].dK_eq[-1], 0.0)
 
 
-def _rest(rule: GrowthRule, last: Step) -> Floats:
+def _rest(rule: GrowthRule, step: Step) -> Floats:
     """Growth that goes on waiting at the stations of a step `(n,)`."""
-    plan = plan_of(last)
-    return np.where(plan.moves, 0.0, solves_of(last)[0].growth(_score(rule, last), plan.length))
+    plan = plan_of(step)
+    return np.where(plan.moves, 0.0, solves_of(step)[0].growth(_score(rule, step), plan.length))
 
 
 def _rows_after(moved_x: Floats, tips: Floats) -> Ints:
@@ -242,14 +242,14 @@ def _rows_after(moved_x: Floats, tips: Floats) -> Ints:
     return np.where(distance <= _SAME * np.abs(tips).max(), row, -1)
 
 
-def _followed_3d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Floats]:
+def _followed_3d(rule: GrowthRule, step: Step, rates: Rates) -> tuple[float, Floats]:
     """Cycles since the last step, and the growth that waits at the places of this one."""
-    stations, mesh = solves_of(last)[0], rates.problem.mesh
-    rest = _rest(rule, last)
+    stations, mesh = solves_of(step)[0], rates.problem.mesh
+    rest = _rest(rule, step)
     rates_after: list[Floats] = []
     growth_owed: list[Floats] = []
     for c, crack in enumerate(rates.cracks):
-        new_sif, moved_x = rates.sif[0][c], moved_places(last, c)
+        new_sif, moved_x = rates.sif[0][c], moved_places(step, c)
         reach = fronts.REACH * float(cell_sizes(mesh, new_sif.x).mean() if len(new_sif.x) else 0.0)
         is_of_crack, is_closed = rates.stations.crack == c, closed_fronts(crack)
         rates_after.append(
@@ -257,16 +257,16 @@ def _followed_3d(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, Flo
                 new_sif.x, new_sif.front, is_closed, rates.law_rate[is_of_crack], moved_x, reach
             )
         )
-        old_sif, is_closed_before = last.sif[0][c], closed_fronts(last.cracks[c])
+        old_sif, is_closed_before = step.sif[0][c], closed_fronts(step.cracks[c])
         growth_nearby = interpolate_along_front(
             moved_x, old_sif.front, is_closed_before, rest[stations.crack == c], new_sif.x, reach
         )
         growth_owed.append(np.nan_to_num(growth_nearby))
-    cycles_across = fronts.cycles_of_passage(rule, last, rates)
+    cycles_across = fronts.cycles_of_passage(rule, step, rates)
     if cycles_across is not None:
         return cycles_across, np.concatenate(growth_owed)
-    sizes = (last.sizes, rates.problem.sizes)
-    cycles = elapsed_3d(*sizes, last.da, last.law_rate, rates_after)
+    sizes = (step.sizes, rates.problem.sizes)
+    cycles = elapsed_3d(*sizes, step.da, step.law_rate, rates_after)
     return cycles, np.concatenate(growth_owed)
 
 
@@ -302,14 +302,14 @@ def elapsed_3d(
     is_moved = [(d > 0) & (r > 0) for d, r in zip(da, rate0)]
     stay = [m & ~np.isnan(r) for m, r in zip(is_moved, rate1)]
     has_rate = any(m.any() for m in stay)
-    largest = [float(r[m].max(initial=-1.0)) for r, m in zip(rate0, stay if has_rate else is_moved)]
-    c = int(np.argmax(largest))
-    driving = (stay if has_rate else is_moved)[c] & (rate0[c] >= largest[c])
+    maxima = [float(r[m].max(initial=-1.0)) for r, m in zip(rate0, stay if has_rate else is_moved)]
+    c = int(np.argmax(maxima))
+    driving = (stay if has_rate else is_moved)[c] & (rate0[c] >= maxima[c])
     j = int(np.argmax(driving))
     by_first_rate = float(da[c][j] / rate0[c][j])
     if not has_rate:
         return by_first_rate
-    is_fast = stay[c] & (rate0[c] >= _DRIVING * largest[c])
+    is_fast = stay[c] & (rate0[c] >= _DRIVING * maxima[c])
     if np.isinf(rate1[c][is_fast]).any():
         return 0.5 * by_first_rate  # as in `cycles_between`
     ratio = float(rate1[c][is_fast].sum() / rate0[c][is_fast].sum())

@@ -152,32 +152,32 @@ def coming_arrivals(step: Step, problem: Problem) -> list[Arriving]:
         result = _arriving_fronts(scaled_step, plan.apart, placed_cracks, mesh)
     else:
         result = _arriving_fronts(step, plan.cracks, problem.placed, mesh)
-    return [_with_identity(step, each) for each in result]
+    return [_with_identity(step, arrival) for arrival in result]
 
 
-def _with_identity(step: Step, one: Arriving) -> Arriving:
+def _with_identity(step: Step, arrival: Arriving) -> Arriving:
     """The same with the identity of the end."""
     if step.identities is None:
-        return one
-    number = one.tip
-    if step.cracks[one.crack].fronts is not None:
-        number = int(step.sif[0][one.crack].front[one.tip])
+        return arrival
+    number = arrival.tip
+    if step.cracks[arrival.crack].fronts is not None:
+        number = int(step.sif[0][arrival.crack].front[arrival.tip])
     ends = step.identities.ends
-    if one.crack >= len(ends) or number >= len(ends[one.crack]):
-        return one
-    end = ends[one.crack][number]
-    return replace(one, end=end, label=step.identities.names[end])
+    if arrival.crack >= len(ends) or number >= len(ends[arrival.crack]):
+        return arrival
+    end = ends[arrival.crack][number]
+    return replace(arrival, end=end, label=step.identities.names[end])
 
 
 def arrivals_of(
-    rule: GrowthRule, last: Step, arrivals_ahead: Sequence[Arriving], end_rate: float | None
+    rule: GrowthRule, step: Step, arrivals_ahead: Sequence[Arriving], end_rate: float | None
 ) -> tuple[Arrival, ...]:
     """When places come to the boundary.
 
     Parameters
     ----------
     rule : GrowthRule
-    last : Step
+    step : Step
         Before the advance.
     arrivals_ahead : sequence of Arriving
     end_rate : float, optional
@@ -185,10 +185,10 @@ def arrivals_of(
     """
     integrator, mesh = integrator_of(rule), rule.problem.mesh
     result = []
-    for one in arrivals_ahead:
-        N = last.cycles + integrator.cycles_until(rule, last, one.part, end_rate)
-        x = tuple(0.0 if abs(v) < _ROUND_OFF * mesh.extent else v for v in one.x)
-        result.append(Arrival(one.crack, one.tip, x, one.name, one.ligament, N, one.end, one.label))
+    for a in arrivals_ahead:
+        N = step.cycles + integrator.cycles_until(rule, step, a.part, end_rate)
+        x = tuple(0.0 if abs(v) < _ROUND_OFF * mesh.extent else v for v in a.x)
+        result.append(Arrival(a.crack, a.tip, x, a.name, a.ligament, N, a.end, a.label))
     return tuple(result)
 
 
@@ -207,13 +207,13 @@ def _tips_outside(advanced_crack: Crack, placed_crack: Crack) -> list[int]:
 
 
 def _arriving_tips(
-    last: Step, advanced_cracks: Sequence[Crack], placed_cracks: Sequence[Crack], mesh: Mesh
+    step: Step, advanced_cracks: Sequence[Crack], placed_cracks: Sequence[Crack], mesh: Mesh
 ) -> list[Arriving]:
     """Tips that have left the body, and the part of their straight way that lies inside."""
     result = []
     for c, pair in enumerate(zip(advanced_cracks, placed_cracks, strict=True)):
         numbers = _tips_outside(*pair)
-        start = _starts(last, advanced_cracks, c) if numbers else np.zeros((0, 2))
+        start = _starts(step, advanced_cracks, c) if numbers else np.zeros((0, 2))
         for j in numbers:
             move = pair[0].points[(pair[0].tips or ())[j]] - start[j]
             way = float(np.linalg.norm(move))
@@ -225,15 +225,15 @@ def _arriving_tips(
     return result
 
 
-def _starts(last: Step, advanced_cracks: Sequence[Crack], c: int) -> Floats:
+def _starts(step: Step, advanced_cracks: Sequence[Crack], c: int) -> Floats:
     """Where the tips of an advanced crack were before `(f, 2)`."""
-    cracks_before = last.corrected
+    cracks_before = step.corrected
     if [crack.n_tips for crack in cracks_before] == [crack.n_tips for crack in advanced_cracks]:
         return tip_frames(cracks_before[c])[0]
     # Tips have met and are gone: the nearest that was is the same one.
-    every = np.concatenate([tip_frames(crack)[0] for crack in cracks_before])
+    all_tips = np.concatenate([tip_frames(crack)[0] for crack in cracks_before])
     tips_now = tip_frames(advanced_cracks[c])[0]
-    return every[[int(np.argmin(np.linalg.norm(every - x, axis=1))) for x in tips_now]]
+    return all_tips[[int(np.argmin(np.linalg.norm(all_tips - x, axis=1))) for x in tips_now]]
 
 
 def ended_crack(
@@ -243,27 +243,27 @@ def ended_crack(
     if placed_crack.fronts is not None:
         return placed_crack
     points = np.array(placed_crack.points)
-    for each in arrivals_ahead:
-        points[(advanced_crack.tips or ())[each.tip]] = each.x
+    for arrival in arrivals_ahead:
+        points[(advanced_crack.tips or ())[arrival.tip]] = arrival.x
     return Crack(points, placed_crack.faces, ())
 
 
 def _arriving_fronts(
-    last: Step, advanced_cracks: Sequence[Crack], placed_cracks: Sequence[Crack], mesh: Mesh
+    step: Step, advanced_cracks: Sequence[Crack], placed_cracks: Sequence[Crack], mesh: Mesh
 ) -> list[Arriving]:
     """Facet sets that a front has come to, each with the place along it that was first.
 
     A front that has left the body as a whole comes with its last place.
     """
     body, (names, group) = Body.of(mesh), facet_names(mesh)
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    outer_facets = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
 
     def name_at(x: Floats) -> str:
-        return names[group[outer[signed_in(body.boundary, x[None])[1][0]]]]
+        return names[group[outer_facets[signed_in(body.boundary, x[None])[1][0]]]]
 
     result = []
     for c, pair in enumerate(zip(advanced_cracks, placed_cracks, strict=True)):
-        start, move = last.sif[0][c].x, moved_places(last, c) - last.sif[0][c].x
+        start, move = step.sif[0][c].x, moved_places(step, c) - step.sif[0][c].x
         part_inside = _parts(start, move, body)
         x = start + np.minimum(part_inside, 1.0)[:, None] * move
         if _tips_outside(*pair):
@@ -272,23 +272,19 @@ def _arriving_fronts(
                 for place, y, way, part in _last_out(start, move, part_inside, body)
             ]
             continue
-        ends_before = [x for _, x in front_ends(last.corrected[c], body)]
-        names_before = {name_at(each) for each in ends_before}
+        ends_before = [x for _, x in front_ends(step.corrected[c], body)]
+        names_before = {name_at(p) for p in ends_before}
         reach = 2.0 * float(np.linalg.norm(move, axis=1).max(initial=0.0))
         for _, end in front_ends(pair[1], body):
             name, reach_of_end = name_at(end), reach + _REACH * float(body.cell_size(end[None])[0])
-            distance = min(
-                (float(np.linalg.norm(end - each)) for each in ends_before), default=np.inf
-            )
+            distance = min((float(np.linalg.norm(end - p)) for p in ends_before), default=np.inf)
             if name in names_before and distance <= reach_of_end:
                 continue
             names_before.add(name)
             ends_before.append(end)
             gap = np.linalg.norm(x - end, axis=1)
             is_out = np.isfinite(part_inside) & (gap <= reach_of_end + reach)
-            is_out &= np.array(
-                [bool(o) and name_at(each) == name for o, each in zip(is_out, x)], bool
-            )
+            is_out &= np.array([bool(o) and name_at(p) == name for o, p in zip(is_out, x)], bool)
             place = int(np.argmin(np.where(is_out, part_inside, np.inf) if is_out.any() else gap))
             place_out, part = (x[place], float(part_inside[place])) if is_out.any() else (end, 1.0)
             way = float(np.linalg.norm(place_out - start[place]))
@@ -323,12 +319,12 @@ def _parts(start: Floats, move: Floats, body: Body) -> Floats:
     depth, size = body.depth(start)
     # A front ends on the surface: what begins there runs along it, and leaves by round-off only.
     rows_out = np.nonzero((depth < -ON * size) & (body.depth(start + move)[0] >= 0))[0]
-    low, high = np.zeros(len(rows_out)), np.ones(len(rows_out))
+    t_in, t_out = np.zeros(len(rows_out)), np.ones(len(rows_out))
     for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
+        middle = 0.5 * (t_in + t_out)
         is_outside = body.depth(start[rows_out] + middle[:, None] * move[rows_out])[0] >= 0
-        low, high = np.where(is_outside, low, middle), np.where(is_outside, middle, high)
-    part[rows_out] = high
+        t_in, t_out = np.where(is_outside, t_in, middle), np.where(is_outside, middle, t_out)
+    part[rows_out] = t_out
     return part
 
 

@@ -181,8 +181,8 @@ def turning_of(x: Floats, is_closed: bool) -> float:
     if is_closed:
         return 2 * np.pi
     j = max(1, len(x) // 6)
-    first, last = x[j] - x[0], x[-1] - x[-1 - j]
-    cosine = first @ last / (np.linalg.norm(first) * np.linalg.norm(last))
+    first_chord, last_chord = x[j] - x[0], x[-1] - x[-1 - j]
+    cosine = first_chord @ last_chord / (np.linalg.norm(first_chord) * np.linalg.norm(last_chord))
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 

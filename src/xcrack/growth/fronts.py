@@ -92,7 +92,7 @@ def interpolate_along_front(
         Linear between the places, nan beyond reach.
     """
     result = np.full((len(target), *values.shape[1:]), np.nan)
-    best = np.full(len(target), float(reach))
+    least_distance = np.full(len(target), float(reach))
     for number in np.unique(front):
         is_of_front = front == number
         line, values_on_line = x[is_of_front], values[is_of_front]
@@ -105,12 +105,12 @@ def interpolate_along_front(
         r, segment, place = front_distance(target, line, is_loop)
         next_point = (segment + 1) % len(line)
         place = np.nan_to_num(place).reshape(-1, *[1] * (values.ndim - 1))
-        first, second = values_on_line[segment], values_on_line[next_point]
+        begin_value, end_value = values_on_line[segment], values_on_line[next_point]
         with np.errstate(invalid="ignore"):  # inf where the toughness is reached
-            interpolated = (1 - place) * first + place * second
-        value = np.where(place == 0, first, np.where(place == 1, second, interpolated))
-        is_nearer = r <= best
-        result[is_nearer], best[is_nearer] = value[is_nearer], r[is_nearer]
+            interpolated = (1 - place) * begin_value + place * end_value
+        value = np.where(place == 0, begin_value, np.where(place == 1, end_value, interpolated))
+        is_nearer = r <= least_distance
+        result[is_nearer], least_distance[is_nearer] = value[is_nearer], r[is_nearer]
     return result
 
 
@@ -150,7 +150,7 @@ def _solved_fronts(
         rows = at.crack == c
         is_closed_front, lengths = np.array(closed_fronts(crack), dtype=bool), front_lengths(crack)
         states = [state[c] for state in rates.sif]
-        most_open = max(states, key=lambda each: each.K_I.max(initial=-np.inf))
+        most_open = max(states, key=lambda sif: sif.K_I.max(initial=-np.inf))
         angle[rows] = without_noise(most_open, rates.angle[rows], is_closed_front, lengths)
         is_closed[rows], length[rows] = is_closed_front[at.front[rows]], lengths[at.front[rows]]
     stations = GrowthStations(
@@ -192,9 +192,9 @@ def _corrected_part(
     crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
     is_inside = partial(inside_body, cracks, c, mesh)
-    places = [front_in_body(one.x, one.frame, one.closed, is_inside) for one in fronts]
-    x = np.concatenate([each.x for each in places])
-    number = np.repeat(np.arange(len(fronts)), [len(each.x) for each in places])
+    places = [front_in_body(front.x, front.frame, front.closed, is_inside) for front in fronts]
+    x = np.concatenate([place.x for place in places])
+    number = np.repeat(np.arange(len(fronts)), [len(place.x) for place in places])
     rate = _values_beside(stations_here, solves.rate[0], x, mesh)
     has_rate = ~np.isnan(rate)
     x, number = x[has_rate], number[has_rate]
@@ -272,7 +272,7 @@ def _all_cracks(
     solves = [part[1] for part in parts]
 
     def rows(name: str, axis: int) -> Floats:
-        return np.concatenate([getattr(each, name) for each in solves], axis=axis)
+        return np.concatenate([getattr(history, name) for history in solves], axis=axis)
 
     return stations, replace(
         solves[0],
@@ -328,9 +328,9 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         is_arrested = rule.retardation is not None and fastest_rate == 0
         return replace(plan, limit="arrest" if is_arrested else "")
     by_cycles = np.inf if rule.cycles is None else rule.cycles * fastest_rate
-    largest = float(min(longest_advance(rule, step.control), by_cycles))
+    length = float(min(longest_advance(rule, step.control), by_cycles))
     row = int(np.argmax(rate))
-    growth = stations.growth(rate, largest)
+    growth = stations.growth(rate, length)
     is_growing = growth >= WAITS_BELOW * cell
     way = _arcs(step, np.where(is_growing, growth, 0.0))
     interfaces = whole_front_ahead(rule, stations.x, _move(stations, _angle(stations, solves), way))
@@ -342,19 +342,19 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
             interfaces.goal[is_beyond] / way[is_beyond],
             (interfaces.goal > interfaces.way)[is_beyond],
         )
-        largest *= float(share[passes].max() if passes.any() else share.min())
-        growth = stations.growth(rate, largest)
+        length *= float(share[passes].max() if passes.any() else share.min())
+        growth = stations.growth(rate, length)
         is_growing = growth >= WAITS_BELOW * cell
         way = _arcs(step, np.where(is_growing, growth, 0.0))
     plan = replace(
         plan,
-        length=largest,
-        cycles=largest / fastest_rate,
+        length=length,
+        cycles=length / fastest_rate,
         arc=way,
         move=_move(stations, _angle(stations, solves), way),
         moves=is_growing,
         tip=row,
-        largest=largest,
+        largest=length,
     )
     return plan.with_cracks(lambda: advanced_cracks(rule, step, way))
 
@@ -454,13 +454,13 @@ def begin_at(
     identities: Identities,
     cycles: float,
     error: StepError,
-    last: Step | None = None,
+    step: Step | None = None,
 ) -> Corrected:
-    """A first step, or a restart with the overload zones that `last` had at the nearest places."""
+    """A first step, or a restart with the overload zones that `step` had at the nearest places."""
     stations, solves = _solved_fronts(rule, rates, identities, 0.0)
     zones = None if rule.retardation is None else no_zones(len(stations))
-    if zones is not None and last is not None:
-        zones = _zones_after(rule, last, stations.x)
+    if zones is not None and step is not None:
+        zones = _zones_after(rule, step, stations.x)
     size = min((rates.problem.sizes[c] for c in set(stations.crack.tolist())), default=np.inf)
     solves = _with_mean_rates(rule, stations, solves, zones)
     control = first_control(rule, size, _shortest_step(rule, stations, solves), np.inf)
@@ -475,25 +475,25 @@ def _shortest_step(rule: GrowthRule, stations: GrowthStations, solves: SolveHist
     return _SHORTEST * float(cell_sizes(rule.problem.mesh, fastest_place)[0])
 
 
-def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) -> Corrected:
     """Advance the fronts of the last step again, now by the rates at both ends of the step."""
-    plan, (stations, solves) = plan_of(last), solves_of(last)
-    error = StepError((), 0.0) if last.error is None else last.error
+    plan, (stations, solves) = plan_of(step), solves_of(step)
+    error = StepError((), 0.0) if step.error is None else step.error
     solved_fronts = _solved_fronts(rule, rates, identities, plan.end)
     parts_here = [_part(solved_fronts, c) for c in range(len(rates.cracks))]
     first_rate = _rate(rule, solves)
     fastest_rate = float(first_rate.max(initial=0.0))
-    rate, direction = _carried_back(rule, last, rates, parts_here)
-    cycles, cycle_error = _cycles(rule, last, rates)
+    rate, direction = _carried_back(rule, step, rates, parts_here)
+    cycles, cycle_error = _cycles(rule, step, rates)
     share = plan.length / rate.max(initial=0.0) * rate if rate.max(initial=0.0) > 0 else None
     overloads = None
     if rule.retardation is not None and 0 < fastest_rate < np.inf:
-        overloads = _overloads_between(rule, last, rates, parts_here)
+        overloads = _overloads_between(rule, step, rates, parts_here)
         rate = rate_at_end(first_rate, overloads[0], plan.cycles)
         share = plan.length / fastest_rate * rate
         cycles = overloads[1]
         cycle_error = share_left(rule) * beyond_trapezoid(cycles, plan.cycles)
-    cycles_across = cycles_of_passage(rule, last, rates)
+    cycles_across = cycles_of_passage(rule, step, rates)
     if cycles_across is not None:  # places stay where they are, a cell behind
         cycles, share = cycles_across, None
     if np.isinf(rates.rate).any() or fastest_rate == 0:
@@ -505,7 +505,7 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         rows = stations.crack == c
         corrected_crack = None
         if share is not None and rows.any():
-            corrected_crack = _corrected_crack(rule, last, c, rates.cracks, share, direction)
+            corrected_crack = _corrected_crack(rule, step, c, rates.cracks, share, direction)
         part = parts_here[c]
         if corrected_crack is None:
             crack = rates.cracks[c]
@@ -523,8 +523,8 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
         else:
             crack, growth_owed, gap[rows], way[rows] = corrected_crack
             stations_before = stations.at(rows)
-            every = [*cracks, crack, *rates.cracks[c + 1 :]]
-            part = _corrected_part(rule, c, every, identities, part, stations_before, growth_owed)
+            network = [*cracks, crack, *rates.cracks[c + 1 :]]
+            part = _corrected_part(rule, c, network, identities, part, stations_before, growth_owed)
         if overloads is not None:
             moved_x = (stations.x + plan.move)[rows]
             arc, zones_left = overloads[0][rows], overloads[2].at(rows)
@@ -534,8 +534,8 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     new_stations, new_solves = _all_cracks(parts)
     if rule.retardation is not None:
         kinds = [
-            _kinds_near(each[0], _kinds(each[1]), part[0].x)
-            for each, part in zip(parts_here, parts, strict=True)
+            _kinds_near(solved_part[0], _kinds(solved_part[1]), part[0].x)
+            for solved_part, part in zip(parts_here, parts, strict=True)
         ]
         new_solves = replace(new_solves, kinds=_all_kinds(kinds))
     zones_of_all = _all_zones(zones) if zones else None
@@ -544,24 +544,24 @@ def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) 
     new_solves = _with_mean_rates(rule, new_stations, new_solves, zones_of_all)
     place_error = share_left(rule) * float(gap.max(initial=0.0))
     control = next_control(
-        rule, last.control, plan.length, place_error, cycle_error, cycles, last.cycles,
+        rule, step.control, plan.length, place_error, cycle_error, cycles, step.cycles,
         _shortest_step(rule, new_stations, new_solves), np.inf,
     )  # fmt: skip
-    place = _errors_at(rule, last, rates, gap)
+    place = _errors_at(rule, step, rates, gap)
     return Corrected(
-        last.cycles + cycles, tuple(cracks), new_stations, new_solves,
+        step.cycles + cycles, tuple(cracks), new_stations, new_solves,
         StepError(place, error.cycles + cycle_error), control, zones_of_all,
     )  # fmt: skip
 
 
 def _carried_back(
     rule: GrowthRule,
-    last: Step,
+    step: Step,
     rates: Rates,
     parts_here: Sequence[tuple[GrowthStations, SolveHistory]],
 ) -> tuple[Floats, Floats]:
     """Rates (n,) and directions (n, 3) at the end of a step, at the stations of its beginning."""
-    plan, (stations, solves) = plan_of(last), solves_of(last)
+    plan, (stations, solves) = plan_of(step), solves_of(step)
     mesh, first = rates.problem.mesh, _rate(rule, solves)
     rate, direction = np.array(first), np.array(solves.direction[-1])
     for c, (part, values) in enumerate(parts_here):
@@ -581,7 +581,7 @@ def _carried_back(
 
 def _corrected_crack(
     rule: GrowthRule,
-    last: Step,
+    step: Step,
     c: int,
     cracks: Sequence[Crack],
     share: Floats,
@@ -591,7 +591,7 @@ def _corrected_crack(
 
     None where the crack that was solved has other fronts: there is nothing to correct.
     """
-    plan, (stations, solves) = plan_of(last), solves_of(last)
+    plan, (stations, solves) = plan_of(step), solves_of(step)
     mesh, rows = rule.problem.mesh, stations.crack == c
     rate = _rate(rule, solves)
     first = plan.length / rate.max() * rate
@@ -613,10 +613,10 @@ def _corrected_crack(
     )
     try:
         moved_length = np.where(is_growing, target, 0.0)
-        crack = advanced_crack(last.corrected[c], stations, c, angle, moved_length, mesh)
+        crack = advanced_crack(step.corrected[c], stations, c, angle, moved_length, mesh)
         if crack.ends_on:
-            every = [crack if k == c else other for k, other in enumerate(cracks)]
-            placed_crack = place_arm(every, c, mesh)
+            network = [crack if k == c else old_crack for k, old_crack in enumerate(cracks)]
+            placed_crack = place_arm(network, c, mesh)
         else:
             placed_crack = place_crack(crack, mesh)
     except GeometryError:
@@ -628,19 +628,19 @@ def _corrected_crack(
     return placed_crack, growth_owed[rows], gap[rows], way[rows]
 
 
-def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple[Floats, ...]:
+def _errors_at(rule: GrowthRule, step: Step, rates: Rates, gap: Floats) -> tuple[Floats, ...]:
     """Errors of the places of the stations, with the part that this step adds."""
-    stations, mesh = solves_of(last)[0], rates.problem.mesh
+    stations, mesh = solves_of(step)[0], rates.problem.mesh
     result = []
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
-        x, old_sif = rates.sif[0][c].x, last.sif[0][c]
+        x, old_sif = rates.sif[0][c].x, step.sif[0][c]
         error_of_place = _values_beside(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
         error_of_place = np.nan_to_num(error_of_place)
-        if len(old_sif.x) and last.error is not None:
+        if len(old_sif.x) and step.error is not None:
             reach = 2 * REACH * float(cell_sizes(mesh, old_sif.x).mean())
             reach += float(gap[rows].max(initial=0.0))
-            error_before, is_closed = last.error.place[c], closed_fronts(last.cracks[c])
+            error_before, is_closed = step.error.place[c], closed_fronts(step.cracks[c])
             error_nearby = interpolate_along_front(
                 old_sif.x, old_sif.front, is_closed, error_before, x, reach
             )
@@ -649,14 +649,14 @@ def _errors_at(rule: GrowthRule, last: Step, rates: Rates, gap: Floats) -> tuple
     return tuple(result)
 
 
-def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
+def _cycles(rule: GrowthRule, step: Step, rates: Rates) -> tuple[float, float]:
     """Cycles of a step by the largest rates at both ends, and what they add to the error.
 
     The largest rate alone counts cycles: all places advance in proportion to it, so that its
     scatter along the front costs nothing. It is a power of the crack size, which grows linearly
     with the advance within the step.
     """
-    plan, (stations, solves) = plan_of(last), solves_of(last)
+    plan, (stations, solves) = plan_of(step), solves_of(step)
     c = int(stations.crack[plan.tip])
     first_rate, later_rate = float(solves.rate[-1].max()), float(rates.law_rate.max(initial=0.0))
     by_first_rate = plan.length / first_rate
@@ -671,9 +671,9 @@ def _cycles(rule: GrowthRule, last: Step, rates: Rates) -> tuple[float, float]:
     return cycles, share_left(rule) * abs(cycles - trapezoid)
 
 
-def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | None:
+def cycles_of_passage(rule: GrowthRule, step: Step, rates: Rates) -> float | None:
     """Cycles of a step in which the fastest place has passed an interface; None elsewhere."""
-    plan, (stations, solves) = plan_of(last), solves_of(last)
+    plan, (stations, solves) = plan_of(step), solves_of(step)
     interfaces, row = whole_front_ahead(rule, stations.x, plan.move), plan.tip
     if interfaces is None or not plan.arc[row] > interfaces.way[row]:
         return None
@@ -686,7 +686,7 @@ def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | Non
             float(rates_in_set(rule, problem, response, int(k)).max())
             for problem, response, k in (
                 (rates.problem, rates.response, interfaces.set_before[row]),
-                (*scene_of(rule, last), interfaces.set_after[row]),
+                (*scene_of(rule, step), interfaces.set_after[row]),
             )
         )
         size = float(solves.scale[row])
@@ -704,7 +704,7 @@ def cycles_of_passage(rule: GrowthRule, last: Step, rates: Rates) -> float | Non
         cycles = np.array(cycles_of_jump(solves, exponent, end, row, way, length - way, power))
     at = np.full(len(interfaces.way), np.nan)
     at[row] = cycles[0]
-    warn_of_passages(rule, last, interfaces, at)
+    warn_of_passages(rule, step, interfaces, at)
     return float(cycles.sum())
 
 
@@ -754,7 +754,7 @@ def _with_mean_rates(
 
 def _overloads_between(
     rule: GrowthRule,
-    last: Step,
+    step: Step,
     rates: Rates,
     parts_here: Sequence[tuple[GrowthStations, SolveHistory]],
 ) -> tuple[Floats, float, OverloadZones]:
@@ -767,7 +767,7 @@ def _overloads_between(
     zones : OverloadZones
         At the stations when they have grown by `arc`.
     """
-    plan, (stations, solves) = plan_of(last), solves_of(last)
+    plan, (stations, solves) = plan_of(step), solves_of(step)
     first = _kinds(solves)
     later_kinds, ratio = [], np.ones(len(stations))
     for c, (part, values) in enumerate(parts_here):
@@ -775,9 +775,9 @@ def _overloads_between(
         moved_x = (stations.x + plan.move)[rows]
         later_kinds.append(_kinds_near(part, _kinds(values), moved_x, first.at(rows)))
         ratio[rows] = rates.problem.sizes[c] / solves.scale[rows]
-    assert last.zones is not None
+    assert step.zones is not None
     integration = _growth_ahead(
-        rule, solves, [first, _all_kinds(later_kinds)], last.zones, plan.length, ratio, np.inf
+        rule, solves, [first, _all_kinds(later_kinds)], step.zones, plan.length, ratio, np.inf
     )
     rest = (
         plan.length / integration.grown_length
@@ -787,13 +787,13 @@ def _overloads_between(
     return rest * integration.arc[-1], rest * float(integration.cycles[-1]), integration.zones
 
 
-def _zones_after(rule: GrowthRule, last: Step, x: Floats) -> OverloadZones:
+def _zones_after(rule: GrowthRule, step: Step, x: Floats) -> OverloadZones:
     """Overload zones at the new places of some of the stations of a step."""
-    plan, (stations, solves) = plan_of(last), solves_of(last)
-    assert last.zones is not None
+    plan, (stations, solves) = plan_of(step), solves_of(step)
+    assert step.zones is not None
     ones_of_stations, length = np.ones(len(stations)), plan.part * plan.length
     integration = _growth_ahead(
-        rule, solves, [_kinds(solves)], last.zones, length, ones_of_stations, np.inf
+        rule, solves, [_kinds(solves)], step.zones, length, ones_of_stations, np.inf
     )
     arc, moved_x = integration.arc[-1], stations.x + plan.part * plan.move
     return zones_onto(integration.zones, arc, arc, moved_x, x)
@@ -830,8 +830,8 @@ def zones_onto(
     arc_within_zone = np.minimum(zones.since, arc)
     share = np.divide(arc_within_zone, arc, out=np.zeros_like(arc), where=arc > 0)
     growth_since = np.maximum(zones.since + share * (way - arc), 0.0)
-    nearest = np.linalg.norm(x[:, None] - moved_x, axis=2).argmin(axis=1)
-    return replace(zones.at(nearest), since=growth_since[nearest])
+    nearest_rows = np.linalg.norm(x[:, None] - moved_x, axis=2).argmin(axis=1)
+    return replace(zones.at(nearest_rows), since=growth_since[nearest_rows])
 
 
 def _growth_ahead(
@@ -844,9 +844,9 @@ def _growth_ahead(
     blocks: float,
 ) -> CycleIntegration:
     """All stations of all fronts; rates are powers of the sizes of the cracks."""
-    arrays = zip(*(each.arrays for each in kinds), strict=True)
+    arrays = zip(*(kind.arrays for kind in kinds), strict=True)
     dK, R, a = (np.concatenate(part) for part in arrays)
-    every = BlockCycles(dK, R, a, kinds[0].sets)
+    cycles = BlockCycles(dK, R, a, kinds[0].sets)
     t = np.linspace(0.0, 1.0, POINTS)[:, None]
     is_even = np.abs(ratio - 1) < 1e-6
     safe_ratio = np.where(is_even, 2.0, ratio)
@@ -856,7 +856,7 @@ def _growth_ahead(
         rule.law,
         rule.retardation,
         block_order(rule),
-        every,
+        cycles,
         nodes,
         x,
         zones,

@@ -23,10 +23,10 @@ def amplification(x: Floats, dim: int = 3) -> Floats:
     """
     if dim == 3:
         return np.asarray(1 + _A * x**-_P / (1 + _B * x**_Q))
-    inner, outer = x / 2, x / 2 + 2
-    m = 1 - (inner / outer) ** 2
-    opening = outer**2 * ellipe(m) / ellipk(m) - inner**2
-    return np.asarray(opening / np.sqrt(inner * (outer**2 - inner**2)))
+    inner_tip, outer_tip = x / 2, x / 2 + 2
+    m = 1 - (inner_tip / outer_tip) ** 2
+    opening = outer_tip**2 * ellipe(m) / ellipk(m) - inner_tip**2
+    return np.asarray(opening / np.sqrt(inner_tip * (outer_tip**2 - inner_tip**2)))
 
 
 def part_of_time(x: float, exponent: float, dim: int = 3) -> float:

@@ -17,7 +17,7 @@ class Integrator(Protocol):
         """The first step of a run."""
 
     def correct(
-        self, rule: GrowthRule, last: Step, rates: Rates, identities: Identities
+        self, rule: GrowthRule, step: Step, rates: Rates, identities: Identities
     ) -> Corrected:
         """What the cracks after an advance mean for the cycles and for the next advance."""
 

@@ -92,9 +92,9 @@ def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhe
     if len(elasticity.named) < 2:
         return None
     mesh, kinds = rule.problem.mesh, _kinds(rule)
-    one, other = mesh.facet_to_cell.T
+    cell_0, cell_1 = mesh.facet_to_cell.T
     of_cell = kinds[elasticity.set_number]
-    facets = mesh.facets[(other >= 0) & (of_cell[one] != of_cell[other])]
+    facets = mesh.facets[(cell_1 >= 0) & (of_cell[cell_0] != of_cell[cell_1])]
     length = np.linalg.norm(move, axis=1)
     if not len(facets) or not length.any():
         return None
@@ -161,8 +161,8 @@ def _kinds(rule: GrowthRule) -> Ints:
     if isinstance(rule.retardation, RetardationSets):
         models = dict(rule.retardation.models)
         texts = [words + str(models[name]) for words, name in zip(texts, names, strict=True)]
-    every = list(zip(number.tolist(), texts, strict=True))
-    return np.array([every.index(each) for each in every], dtype=np.int64)
+    pairs = list(zip(number.tolist(), texts, strict=True))
+    return np.array([pairs.index(pair) for pair in pairs], dtype=np.int64)
 
 
 def _hits(facets: Floats, x: Floats, direction: Floats, largest_way: float) -> Floats:
@@ -196,22 +196,22 @@ def _hits(facets: Floats, x: Floats, direction: Floats, largest_way: float) -> F
 def _power_of_K(elasticity: Elasticity, place_before: Floats, place_behind: Floats) -> float:
     """Power of the distance to an interface that K goes like: above 0 before a stiffer material."""
     try:
-        material, other = (
+        material, solid = (
             elasticity.isotropic_at(place_before),
             elasticity.isotropic_at(place_behind),
         )
     except ProblemError:  # not isotropic
         return 0.0
-    return 0.5 - singularity_at_interface(material, other)
+    return 0.5 - singularity_at_interface(material, solid)
 
 
-def singularity_at_interface(material_at_tip: Isotropic, other: Isotropic) -> float:
+def singularity_at_interface(material_at_tip: Isotropic, solid: Isotropic) -> float:
     """Order λ of the stresses r^-λ at a tip on an interface, which its crack meets at right angles.
 
     Parameters
     ----------
-    material_at_tip, other : Isotropic
-        Materials of the crack, and ahead of it.
+    material_at_tip, solid : Isotropic
+        Materials of the crack, and of the solid ahead of it.
 
     Notes
     -----
@@ -226,9 +226,9 @@ def singularity_at_interface(material_at_tip: Isotropic, other: Isotropic) -> fl
     >>> round(singularity_at_interface(steel, steel), 6)
     0.5
     """
-    alpha = (other.E_prime - material_at_tip.E_prime) / (other.E_prime + material_at_tip.E_prime)
-    beta = (other.mu * (material_at_tip.kolosov - 1) - material_at_tip.mu * (other.kolosov - 1)) / (
-        other.mu * (material_at_tip.kolosov + 1) + material_at_tip.mu * (other.kolosov + 1)
+    alpha = (solid.E_prime - material_at_tip.E_prime) / (solid.E_prime + material_at_tip.E_prime)
+    beta = (solid.mu * (material_at_tip.kolosov - 1) - material_at_tip.mu * (solid.kolosov - 1)) / (
+        solid.mu * (material_at_tip.kolosov + 1) + material_at_tip.mu * (solid.kolosov + 1)
     )
 
     def is_above(order: float) -> bool:
@@ -393,7 +393,7 @@ def cycles_of_jump(
     The rate is a power of the distance to the interface times one of the size of the crack. That
     of the size follows from the last two solves before it, on both sides.
     """
-    last_solves, scale = old_solves.last(2), float(old_solves.scale[row])
+    last_solves, scale = old_solves.last_solves(2), float(old_solves.scale[row])
     size = scale + last_solves.sigma
     power_before, power_after = (
         float(np.clip(power * m, -_MOST_POWER, _MOST_POWER))
@@ -461,18 +461,18 @@ def cycles_across(
 
 
 def warn_of_passages(
-    rule: GrowthRule, last: Step, interfaces: InterfacesAhead, cycles: Floats
+    rule: GrowthRule, step: Step, interfaces: InterfacesAhead, cycles: Floats
 ) -> None:
     """Say where ends pass interfaces, `cycles` `(n,)` after a step; nan where they do not."""
-    stations, move = solves_of(last)[0], plan_of(last).move
+    stations, move = solves_of(step)[0], plan_of(step).move
     names = [name for name, _ in rule.problem.elasticity.named]
     for row in np.nonzero(np.isfinite(cycles))[0].tolist():
-        name = last.end_name(int(stations.crack[row]), int(stations.front[row]))
+        name = step.end_name(int(stations.crack[row]), int(stations.front[row]))
         x = stations.x[row] + interfaces.way[row] * move[row] / np.linalg.norm(move[row])
         warn(
             f"{name} passes from {names[interfaces.set_before[row]]!r} into "
             f"{names[interfaces.set_after[row]]!r} at {coordinates(x.tolist())}, "
-            f"N = {last.cycles + float(cycles[row]):.6g}"
+            f"N = {step.cycles + float(cycles[row]):.6g}"
         )
 
 

@@ -118,7 +118,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         )
     m = solves_of(step)[1].exponent
     time, way, time_at_first_rate = min(
-        [_shares_at_meeting(rule, step, plan, *each, body, m) for each in close_pairs]
+        [_shares_at_meeting(rule, step, plan, *close_pair, body, m) for close_pair in close_pairs]
         + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
         + [_met_face(rule, step, plan, *pair, body, m, True) for pair in pairs_beside]
     )
@@ -204,7 +204,7 @@ def _led_on(joined_now: _Joined, area_apart: Floats, area_joined: Floats, is_bes
     if len(area_apart) != len(area_joined):
         return 0.0
     pairs = zip(joined_now.cracks_apart, joined_now.cracks, strict=True)
-    is_host = np.array([one.ends_on == other.ends_on for one, other in pairs])
+    is_host = np.array([crack.ends_on == crack_joined.ends_on for crack, crack_joined in pairs])
     return float((area_joined - area_apart)[is_host].sum())
 
 
@@ -241,12 +241,12 @@ def _joined_cracks(
         cracks_now, _numbers(steep_pairs, number), body
     ):
         (i, k), gap, size = pairs[0]
-        other = cracks_now[k] if gap.turn > 0 else turned_crack(cracks_now[k])
+        second_crack = cracks_now[k] if gap.turn > 0 else turned_crack(cracks_now[k])
         lateral_step = STEP * size if gap.offset > OFFSET * size else 0.0
         radius, pair_met = max(_RADIUS * size, _WIDER * gap.width), (number[i], number[k])
         try:
             cracks_now[i] = merged_crack(
-                cracks_now[i], other, radius, _SPACING * size, lateral_step, body
+                cracks_now[i], second_crack, radius, _SPACING * size, lateral_step, body
             )
         except GeometryError as failure:  # of tilted fronts whose gap has no outline one is an arm
             arm = _with_arm(rule, cracks_now, (i, k), body) if abs(gap.turn) < _FLAT else None
@@ -266,8 +266,8 @@ def _joined_cracks(
 
 def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) -> Plan | None:
     """A plan in which a ligament inside one crack breaks within its advance; None without one."""
-    inner = _inner_front(step, plan, body)
-    if inner is None:
+    inner_front = _inner_front(step, plan, body)
+    if inner_front is None:
         facing_share = _facing_share(rule, step, plan, body)
         if facing_share is None:
             return None
@@ -276,7 +276,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         crack = with_own_gap_closed(cracks_apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
         x, time, gain = gap.x, way, 1.0
     else:
-        c, f, time = inner
+        c, f, time = inner_front
         stations = solves_of(step)[0]
         moves = (stations.crack != c) | (stations.front != f)
         arc = np.where(moves, time * plan.arc, 0.0)
@@ -287,7 +287,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         discs = [without_inner_front(step.corrected[c], f)[0], crack]
         area, new_area = (crack_areas([disc], body.mesh)[0] for disc in discs)
         gain = _gain_of(new_area / area, solves_of(step)[1].exponent, 1.0)
-    cracks_now = [crack if k == c else other for k, other in enumerate(cracks_apart)]
+    cracks_now = [crack if k == c else crack_apart for k, crack_apart in enumerate(cracks_apart)]
     cycles = time * plan.cycles / gain
     join = Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), (c, c))
     return replace(
@@ -330,7 +330,7 @@ def _facing_share(
         cracks_now = plan.cracks if share == 1.0 else _cracks_after(rule, step, plan, share)
         gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(cracks_now)]
         open_gaps = [(c, gap) for c, gap in gaps if gap is not None]
-        return min(open_gaps, key=lambda each: each[1].width, default=None)
+        return min(open_gaps, key=lambda pair: pair[1].width, default=None)
 
     if not plan.limit:
         gap_met = nearest_gap(1.0)
@@ -340,17 +340,17 @@ def _facing_share(
             return gap_met[0], 1.0, gap_met[1]
     elif _OWN not in plan.refusal:
         return None
-    low, high = 0.0, 1.0
+    s_min, s_max = 0.0, 1.0
     for _ in range(_TRIES):
-        share = 0.5 * (low + high)
+        share = 0.5 * (s_min + s_max)
         try:
             gap_met = nearest_gap(share)
         except GeometryError:
-            high = share
+            s_max = share
             continue
         if gap_met is not None and gap_met[1].width > _LEFT * gap_met[1].size:
             return gap_met[0], share, gap_met[1]
-        low, high = (low, share) if gap_met is not None else (share, high)
+        s_min, s_max = (s_min, share) if gap_met is not None else (share, s_max)
     return None
 
 
@@ -358,14 +358,14 @@ def _cracks_after(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list
     return _INTEGRATORS[rule.integrator].partly_advanced(rule, step, plan, part)
 
 
-def correct_join(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) -> Corrected:
     """A step whose cracks have just joined: growth begins anew, after the cycles so far."""
-    mesh, cycles_before = rates.problem.mesh, 0.0 if last.error is None else last.error.cycles
-    plan = plan_of(last)
-    place = tuple(_errors(last, sif.x, mesh) for sif in rates.sif[0])
+    mesh, cycles_before = rates.problem.mesh, 0.0 if step.error is None else step.error.cycles
+    plan = plan_of(step)
+    place = tuple(_errors(step, sif.x, mesh) for sif in rates.sif[0])
     error = StepError(place, cycles_before + plan.error)
     return _INTEGRATORS[rule.integrator].begin_at(
-        rule, rates, identities, last.cycles + plan.cycles, error, last
+        rule, rates, identities, step.cycles + plan.cycles, error, step
     )
 
 
@@ -376,7 +376,7 @@ def _faces_near(cracks: Sequence[Crack], body: Body) -> list[FaceAhead]:
         for c, on in permutations(range(len(cracks)), 2)
         if not may_touch(cracks, c, on)
     ]
-    return sorted([each for each in faces_near if each is not None], key=lambda each: each.width)
+    return sorted([face for face in faces_near if face is not None], key=lambda face: face.width)
 
 
 def _faces_met(cracks: Sequence[Crack], body: Body) -> list[tuple[int, int]]:
@@ -446,9 +446,9 @@ def _arms_to_be(
     """Faces ahead of the fronts of either of two cracks; then those of fronts that are led on."""
     pair_orders = (pair, pair[::-1])
     faces_met = [face_ahead(cracks, c, on, body, _AHEAD) for c, on in pair_orders]
-    yield from ((one, None) for one in sorted(filter(None, faces_met), key=lambda one: one.width))
+    yield from ((face, None) for face in sorted(filter(None, faces_met), key=lambda f: f.width))
     faces_beside = (_face_beside(cracks, c, on, body) for c, on in pair_orders)
-    yield from (each[1:] for each in sorted(filter(None, faces_beside), key=lambda each: each[0]))
+    yield from (row[1:] for row in sorted(filter(None, faces_beside), key=lambda row: row[0]))
 
 
 def _face_beside(
@@ -540,31 +540,31 @@ def _met_face(
         pair_orders = ((i, k), (k, i))
         if is_beside:
             faces_beside = (_face_beside(cracks_now, *pair, body) for pair in pair_orders)
-            nearest = min(filter(None, faces_beside), key=lambda each: each[0], default=None)
-            return None if nearest is None else nearest[1]
+            nearest_row = min(filter(None, faces_beside), key=lambda row: row[0], default=None)
+            return None if nearest_row is None else nearest_row[1]
         faces_ahead = (face_ahead(cracks_now, *pair, body, _AHEAD) for pair in pair_orders)
-        return min(filter(None, faces_ahead), key=lambda one: one.width, default=None)
+        return min(filter(None, faces_ahead), key=lambda face: face.width, default=None)
 
     def is_near(face: FaceAhead, share: float = 1.0) -> bool:
         return face.width <= share * _LEFT * face.leg
 
-    low, high, face_met = 0.0, 1.0, face_after(1.0)
-    while face_met is not None and not is_near(face_met) and high * plan.largest < face_met.leg:
-        low, high = high, high + face_met.leg / plan.largest
-        face_met = face_after(high)
-    way = high
+    w_min, w_max, face_met = 0.0, 1.0, face_after(1.0)
+    while face_met is not None and not is_near(face_met) and w_max * plan.largest < face_met.leg:
+        w_min, w_max = w_max, w_max + face_met.leg / plan.largest
+        face_met = face_after(w_max)
+    way = w_max
     if face_met is not None and is_near(face_met):
         for _ in range(_TRIES):
-            way = 0.5 * (low + high)
+            way = 0.5 * (w_min + w_max)
             face_met = face_after(way)
             if face_met is not None and is_near(face_met, 0.5):
-                high = way
+                w_max = way
             elif face_met is None or not is_near(face_met):
-                low = way
+                w_min = way
             else:
                 break
         else:
-            way = low
+            way = w_min
             face_met = face_after(way)
     if face_met is None:
         return way, way, way
@@ -596,11 +596,11 @@ def _close_pairs(
             continue
         if gap.faces if not cracks_before else _is_facing(cracks_before[i], cracks_before[k], body):
             result.append(((i, k), gap, size))
-    return sorted(result, key=lambda each: each[1].width / each[2])
+    return sorted(result, key=lambda row: row[1].width / row[2])
 
 
-def _is_facing(one: Crack, other: Crack, body: Body) -> bool:
-    gap = gap_between(one, other, body, np.inf)
+def _is_facing(first_crack: Crack, second_crack: Crack, body: Body) -> bool:
+    gap = gap_between(first_crack, second_crack, body, np.inf)
     return gap is not None and gap.faces
 
 
@@ -630,8 +630,8 @@ def _shares_at_meeting(
     """
     i, k = pair
     # Over an offset a wider gap is closed: of half a cell, or half as wide as a high step.
-    high = gap_near.offset / size
-    share_left = float(np.clip(high, _LEFT, max(OFFSET, _STEEP * high)))
+    offset_share = gap_near.offset / size
+    share_left = float(np.clip(offset_share, _LEFT, max(OFFSET, _STEEP * offset_share)))
     way = _share(rule, step, plan, pair, size, share_left, body)
     first = gap_between(step.corrected[i], step.corrected[k], body, np.inf)
     gap, gap_left = (0.0 if first is None else first.width), share_left * size
@@ -684,36 +684,36 @@ def _share(
         gap = gap_between(cracks_now[i], cracks_now[k], body, 10 * size + 2 * share * plan.largest)
         return np.inf if gap is None else gap.width / size - gap_left
 
-    low, at_low = 0.0, excess(0.0)
-    high, at_high = 1.0, excess(1.0)
-    while at_high > 0 and high < largest_share:
-        low, at_low = high, at_high
-        high = min(2 * high, largest_share)
-        at_high = excess(high)
-    if at_high > 0 or not np.isfinite(at_low):
-        return high
-    if at_low <= 0:
+    s_min, at_min = 0.0, excess(0.0)
+    s_max, at_max = 1.0, excess(1.0)
+    while at_max > 0 and s_max < largest_share:
+        s_min, at_min = s_max, at_max
+        s_max = min(2 * s_max, largest_share)
+        at_max = excess(s_max)
+    if at_max > 0 or not np.isfinite(at_min):
+        return s_max
+    if at_min <= 0:
         return 0.0
     for _ in range(_TRIES):
         # Where fronts overlap the gap is zero and says nothing of how far: then halve.
-        part = at_low / (at_low - at_high) if at_high > -0.99 * gap_left else 0.5
-        share = low + part * (high - low)
+        part = at_min / (at_min - at_max) if at_max > -0.99 * gap_left else 0.5
+        share = s_min + part * (s_max - s_min)
         value = excess(share)
         if abs(value) < _WITHIN:
             return share
         if value > 0:
-            low, at_low = share, value
+            s_min, at_min = share, value
         else:
-            high, at_high = share, value
-    return high
+            s_max, at_max = share, value
+    return s_max
 
 
-def _errors(last: Step, x: Floats, mesh: Mesh) -> Floats:
+def _errors(step: Step, x: Floats, mesh: Mesh) -> Floats:
     """Estimated errors of the places of a step at places close by, 0 elsewhere."""
     result = np.zeros(len(x))
-    for c, crack in enumerate(last.cracks):
-        place = None if last.error is None else last.error.place[c]
-        old_sif = last.sif[0][c]
+    for c, crack in enumerate(step.cracks):
+        place = None if step.error is None else step.error.place[c]
+        old_sif = step.sif[0][c]
         if place is None or not len(old_sif.x):
             continue
         reach = _REACH * float(cell_sizes(mesh, old_sif.x).mean())

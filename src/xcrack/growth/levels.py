@@ -55,11 +55,11 @@ class LevelTable:
             share = (factors - self.levels[left_level]) / (
                 self.levels[left_level + 1] - self.levels[left_level]
             )
-            low, high = self.K[left_level], self.K[left_level + 1]
-            result = low + share[:, None, None] * (high - low)
-        nearest = left_level + (factors == self.levels[left_level + 1])
-        is_solved = factors == self.levels[nearest]
-        result[is_solved] = self.K[nearest[is_solved]]
+            K_left, K_right = self.K[left_level], self.K[left_level + 1]
+            result = K_left + share[:, None, None] * (K_right - K_left)
+        nearest_level = left_level + (factors == self.levels[left_level + 1])
+        is_solved = factors == self.levels[nearest_level]
+        result[is_solved] = self.K[nearest_level[is_solved]]
         return result
 
 
@@ -96,8 +96,8 @@ def refined_response(
     of some place is off by more than the tolerance, and matters: the middle changes the growth of a
     block there by more than a quarter of the tolerance, of that of the fastest place.
     """
-    low, high = float(first[0]), float(first[-1])
-    earlier_levels = [x for x in reuse.levels if low <= x <= high]
+    f_min, f_max = float(first[0]), float(first[-1])
+    earlier_levels = [x for x in reuse.levels if f_min <= x <= f_max]
     solved_levels: dict[float, LevelResponse] = {}
     handed_on = reuse
 
@@ -118,11 +118,11 @@ def refined_response(
     handed_on = solve_at([*first.tolist(), *earlier_levels])
     levels = first.tolist()
     is_active = np.ones(len(levels) - 1, dtype=bool)
-    if not any(each.response.may_bend for each in solved_levels.values()):
+    if not any(level.response.may_bend for level in solved_levels.values()):
         is_active[:] = (
             False  # no crack has contact in any state: its gaps are lines over the factor
         )
-    ends = _ends(spectrum, low, high)
+    ends = _ends(spectrum, f_min, f_max)
     while is_active.any() and len(levels) < _MOST:
         numbers = np.nonzero(is_active)[0][: _MOST - len(levels)]
         middle = [0.5 * (levels[k] + levels[k + 1]) for k in numbers]
@@ -133,11 +133,11 @@ def refined_response(
         is_active = np.array(
             [a in levels_of_bend or b in levels_of_bend for a, b in zip(levels, levels[1:])]
         )
-    every = [solved_levels[factor] for factor in sorted(solved_levels)]
+    responses = [solved_levels[factor] for factor in sorted(solved_levels)]
     return Response(
-        tuple(each.response.states[each.row] for each in every),
-        tuple(each.sif for each in every),
-        tuple(each.response.solutions[each.row] for each in every if each.response.solutions),
+        tuple(r.response.states[r.row] for r in responses),
+        tuple(r.sif for r in responses),
+        tuple(r.response.solutions[r.row] for r in responses if r.response.solutions),
         replace(_with_nearest_sets(handed_on, solved_levels, levels), levels=tuple(levels)),
     )
 
@@ -160,22 +160,22 @@ def _with_nearest_sets(
     ]
     closed_sets: list[Bools | None] = []
     for c in range(len(reuse.centre)):
-        sets = [each.response.reuse.active[c] for each in nearest_levels]
-        rows = [part[each.row] for part, each in zip(sets, nearest_levels) if part is not None]
+        sets = [level.response.reuse.active[c] for level in nearest_levels]
+        rows = [part[level.row] for part, level in zip(sets, nearest_levels) if part is not None]
         closed_sets.append(np.stack(rows) if len(rows) == len(nearest_levels) else None)
     centre = tuple(x if a is not None else None for x, a in zip(reuse.centre, closed_sets))
     return replace(reuse, centre=centre, active=tuple(closed_sets))
 
 
-def _ends(spectrum: Spectrum, low: float, high: float) -> tuple[Floats, Ints, Floats]:
+def _ends(spectrum: Spectrum, f_min: float, f_max: float) -> tuple[Floats, Ints, Floats]:
     """Even factors, both ends of the kinds of cycles among them `(2, p)`, and how often."""
     values, count, _ = distinct_cycles(spectrum.cycles)
-    rows = np.rint((values - low) / (high - low) * (_POINTS - 1)).astype(np.int64)
+    rows = np.rint((values - f_min) / (f_max - f_min) * (_POINTS - 1)).astype(np.int64)
     pairs, number_of_pair = np.unique(rows, axis=0, return_inverse=True)
     number = np.bincount(number_of_pair.reshape(-1), weights=count, minlength=len(pairs)).astype(
         float
     )
-    return np.linspace(low, high, _POINTS), pairs.T, number
+    return np.linspace(f_min, f_max, _POINTS), pairs.T, number
 
 
 def _levels_that_matter(
@@ -200,8 +200,8 @@ def _levels_that_matter(
             continue
         table_before = LevelTable(np.array(levels), K[is_old], is_smooth=True)
         table_after = LevelTable(np.array(all_levels), K, is_smooth=True)
-        largest = max(float(np.abs(K).max()), np.finfo(float).tiny)
-        error = np.abs(K[~is_old] - table_before.at(np.array(middle))).max(axis=2) / largest
+        K_scale = max(float(np.abs(K).max()), np.finfo(float).tiny)
+        error = np.abs(K[~is_old] - table_before.at(np.array(middle))).max(axis=2) / K_scale
         growth_before, growth_after = (
             _growths(ladder, factors, pairs, count) for ladder in (table_before, table_after)
         )
@@ -247,17 +247,17 @@ def respond_to_levels(
     reuse : SolverState
         Of the step before.
     """
-    low, high = spectrum.extremes
-    every = np.unique([spectrum.cycles["min"], spectrum.cycles["max"]])
+    f_min, f_max = spectrum.extremes
+    all_factors = np.unique([spectrum.cycles["min"], spectrum.cycles["max"]])
     is_exact = is_homogeneous(problem, spectrum) or problem.contact == "off"
     if spectrum.levels != "auto":
-        factors = np.linspace(low, high, int(spectrum.levels))
+        factors = np.linspace(f_min, f_max, int(spectrum.levels))
     elif is_exact:
-        factors = np.array([low, high])
-    elif len(every) <= _FIRST:
-        factors, is_exact = every, True  # all that is asked for is solved
+        factors = np.array([f_min, f_max])
+    elif len(all_factors) <= _FIRST:
+        factors, is_exact = all_factors, True  # all that is asked for is solved
     else:
-        factors = np.linspace(low, high, _FIRST)
+        factors = np.linspace(f_min, f_max, _FIRST)
     if is_exact or spectrum.levels != "auto":
         return solve(states_of(spectrum, factors), reuse)
     return refined_response(spectrum, factors, solve, reuse)
@@ -338,11 +338,11 @@ def respond_under_program(
         factor = load_factor_at(rule, problem, N)
         return respond_to_states(rule, problem, reuse, bars, factor)
     response = respond_to_states(rule, problem, reuse, bars)
-    nu, largest = problem.elasticity.poisson, 0.0
+    nu, largest_K = problem.elasticity.poisson, 0.0
     for of_crack in zip(*response.sif, strict=True):
         K = clipped_K(np.stack([sif.K for sif in of_crack]))
-        largest = max(largest, float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0)))
-    return response.scaled(load_factor_at(rule, problem, N, largest))
+        largest_K = max(largest_K, float(equivalent_K(K, kink_angle(K), nu).max(initial=0.0)))
+    return response.scaled(load_factor_at(rule, problem, N, largest_K))
 
 
 def load_factor_at(rule: GrowthRule, problem: Problem, N: float, K_max: float = np.nan) -> float:

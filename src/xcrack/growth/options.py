@@ -335,7 +335,7 @@ def run_of(
 def lists_options(function: AnyFunction) -> AnyFunction:
     """Let help and completion list the `GrowthOptions` that a function takes by name."""
     signature = inspect.signature(function)
-    default = {each.name: each.default for each in fields(GrowthRule)}
+    default = {option.name: option.default for option in fields(GrowthRule)}
     parameters = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
     options = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default[name])

@@ -153,7 +153,7 @@ class Rates:
         return law_exponent(law, self.dK_eq, self.R, names)
 
     @property
-    def largest(self) -> float:
+    def largest_rate(self) -> float:
         """Largest rate, length/cycle."""
         return float(self.rate.max(initial=0.0))
 
@@ -177,7 +177,7 @@ def rates_of(
     if free_response is None:
         free_response = response_without_contact(rule, problem, response)
     inputs = criterion_inputs(rule, problem, response, free_response)
-    parts = [each.rates_of_K(each.K) for each in inputs]
+    parts = [crack_input.rates_of_K(crack_input.K) for crack_input in inputs]
     angle, dK_eq, R, law_rate, R_range = (
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("angle", "dK_eq", "R", "rate", "R_range")
@@ -210,7 +210,7 @@ def rates_by_law_of(rule: GrowthRule, problem: Problem, response: Response, sets
     names_of_sets = np.array([name for name, _ in problem.elasticity.named])[sets]
     names = np.split(names_of_sets, np.cumsum([len(sif.x) for sif in response.sif[0]])[:-1])
     inputs = criterion_inputs(rule, problem, response, names=names)
-    return np.concatenate([one.rates_of_K(one.K).rate for one in inputs])
+    return np.concatenate([crack_input.rates_of_K(crack_input.K).rate for crack_input in inputs])
 
 
 def response_without_contact(
@@ -294,9 +294,9 @@ def _inputs_of_blocks(
     materials: Sequence[Names],
 ) -> list[CriterionInput]:
     place = GEOMETRY[problem.mesh.dim].station
-    every = pairs_of(rule, problem, response)
+    kinds = pairs_of(rule, problem, response)
     nominal_pairs = (
-        [None] * len(every) if free_response is None else pairs_of(rule, problem, free_response)
+        [None] * len(kinds) if free_response is None else pairs_of(rule, problem, free_response)
     )
 
     def of_crack(c: int, pairs: RangePairs, free_pairs: RangePairs | None) -> CriterionInput:
@@ -316,7 +316,7 @@ def _inputs_of_blocks(
         flat_shape = (shape[0] * shape[1], *shape[2:])  # -1 means nothing where no tip is left
         return CriterionInput(pairs.K.reshape(flat_shape), rates_of_K, angle_of_K)
 
-    return [of_crack(c, *each) for c, each in enumerate(zip(every, nominal_pairs, strict=True))]
+    return [of_crack(c, *pair) for c, pair in enumerate(zip(kinds, nominal_pairs, strict=True))]
 
 
 def law_size(dim: int, size: float, n: int) -> Floats:
@@ -359,18 +359,18 @@ def _is_locked(problem: Problem, response: Response, dK_eq: Floats) -> Bools:
     must not grow on.
     """
     solutions, sif = response.solutions, response.sif
-    parts = [np.zeros(len(each.x), dtype=bool) for each in sif[0]]
+    parts = [np.zeros(len(s.x), dtype=bool) for s in sif[0]]
     rubbing_cracks = [c for c in range(len(parts)) if has_slip(solutions[0], c)]
     if rubbing_cracks:
-        nu = problem.elasticity.poisson_at(np.concatenate([each.x for each in sif[0]]))
+        nu = problem.elasticity.poisson_at(np.concatenate([s.x for s in sif[0]]))
         K = clipped_K(at_stations(sif, "K"))
-        largest = float(local_equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
+        K_scale = float(local_equivalent_K(K, kink_angle(K), nu).max(initial=0.0))
         split_ranges = split(dK_eq, [len(part) for part in parts])
     for c in rubbing_cracks:
         lips = solutions[0].lips[c]
-        nearest = [int(np.argmin(np.linalg.norm(lips.x - x, axis=1))) for x in sif[0][c].x]
-        is_stuck_in_states = [s.contact[c].stuck[nearest] for s in solutions]  # type: ignore[union-attr,index]
-        parts[c] = np.all(is_stuck_in_states, axis=0) | (split_ranges[c] <= _ROUND_OFF * largest)
+        nearest_points = [int(np.argmin(np.linalg.norm(lips.x - x, axis=1))) for x in sif[0][c].x]
+        is_stuck_in_states = [s.contact[c].stuck[nearest_points] for s in solutions]  # type: ignore[union-attr,index]
+        parts[c] = np.all(is_stuck_in_states, axis=0) | (split_ranges[c] <= _ROUND_OFF * K_scale)
     return np.concatenate(parts)
 
 
@@ -442,8 +442,8 @@ def pairs_of(rule: GrowthRule, problem: Problem, response: Response) -> list[Ran
         return []
     if spectrum.states is not None:
         nu = [problem.elasticity.poisson_at(sif.x) for sif in response.sif[0]]
-        every = [np.stack([sif.K for sif in crack]) for crack in zip(*response.sif)]
-        return [pairs_of_states(K, spectrum, ratio) for K, ratio in zip(every, nu, strict=True)]
+        all_K = [np.stack([sif.K for sif in crack]) for crack in zip(*response.sif)]
+        return [pairs_of_states(K, spectrum, ratio) for K, ratio in zip(all_K, nu, strict=True)]
     values, count, _ = distinct_cycles(spectrum.cycles)
     result = []
     for ladder in ladders(problem, spectrum, response):
@@ -459,13 +459,13 @@ def pairs_of_states(K: Floats, spectrum: Spectrum, nu: float | Floats) -> RangeP
     n, f = severity.shape
     count = np.zeros((n, n, f))
     for place in range(f):
-        for one, other in closed_cycles(severity[spectrum.sequence, place]):
-            i, j = sorted((int(spectrum.sequence[one]), int(spectrum.sequence[other])))
+        for begin, end in closed_cycles(severity[spectrum.sequence, place]):
+            i, j = sorted((int(spectrum.sequence[begin]), int(spectrum.sequence[end])))
             count[i, j, place] += 1
-    first, second = np.nonzero(count.any(axis=2))
-    if not len(first):  # no station feels a difference
-        first, second = np.array([0]), np.array([1])
-    return RangePairs(np.stack([K[first], K[second]]), count[first, second])
+    first_state, second_state = np.nonzero(count.any(axis=2))
+    if not len(first_state):  # no station feels a difference
+        first_state, second_state = np.array([0]), np.array([1])
+    return RangePairs(np.stack([K[first_state], K[second_state]]), count[first_state, second_state])
 
 
 def rates_by_kind(
@@ -516,12 +516,12 @@ def rates_by_kind(
     return PairRates(*np.concatenate(parts, axis=1)) if parts else PairRates(*np.zeros((4, p, f)))
 
 
-def block_of(every: PairRates, count: Floats) -> CycleRates:
+def block_of(kinds: PairRates, count: Floats) -> CycleRates:
     """Direction, range, ratio and growth of a block at each station.
 
     Parameters
     ----------
-    every : PairRates
+    kinds : PairRates
     count : (p, f) array
 
     Returns
@@ -531,17 +531,17 @@ def block_of(every: PairRates, count: Floats) -> CycleRates:
         the cycles' directions, each weighted with its growth. One cycle stays as it is.
     """
     counts = count > 0
-    growth = np.where(counts, count * every.rate, 0.0)
-    dK_of_rows = np.where(counts, every.dK, -1.0)
-    largest, place = dK_of_rows.argmax(axis=0), np.arange(count.shape[1])
-    dK, R, angle = (x[largest, place] for x in (every.dK, every.R, every.angle))
-    R_of_rows = np.where(counts, every.R, R)
+    growth = np.where(counts, count * kinds.rate, 0.0)
+    dK_of_rows = np.where(counts, kinds.dK, -1.0)
+    largest_row, place = dK_of_rows.argmax(axis=0), np.arange(count.shape[1])
+    dK, R, angle = (x[largest_row, place] for x in (kinds.dK, kinds.R, kinds.angle))
+    R_of_rows = np.where(counts, kinds.R, R)
     R_range = np.stack([R_of_rows.min(axis=0), R_of_rows.max(axis=0)], axis=1)
     rate = growth.sum(axis=0)
     mean = np.isfinite(rate) & (rate > 0) & ((growth > 0).sum(axis=0) > 1)
     with np.errstate(invalid="ignore"):
         x, y = (
-            np.where(mean, (growth * f(every.angle)).sum(axis=0), 1.0) for f in (np.cos, np.sin)
+            np.where(mean, (growth * f(kinds.angle)).sum(axis=0), 1.0) for f in (np.cos, np.sin)
         )
     angle = np.where(mean, np.arctan2(y, x) + 0.0, angle)
     return CycleRates(angle, dK, R, rate, R_range)
@@ -571,7 +571,7 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
         return 0.0
     values, count, _ = distinct_cycles(ranges_left_out)
     largest_share = 0.0
-    every = pairs_of(rule, problem, response)
+    pairs_of_cracks = pairs_of(rule, problem, response)
     for c, ladder in enumerate(ladders(problem, spectrum, response)):
         K = np.stack([ladder.at(values[:, 0]), ladder.at(values[:, 1])])
         f = K.shape[2]
@@ -583,7 +583,7 @@ def left_out_share(rule: GrowthRule, problem: Problem, response: Response) -> fl
         small_pairs = RangePairs(K, np.repeat(count[:, None], f, axis=1))
         growth = [
             block_of(rates_by_kind(rule, pairs, nu, c, "tip", a, names=names), pairs.count).rate
-            for pairs in (small_pairs, every[c])
+            for pairs in (small_pairs, pairs_of_cracks[c])
         ]
         rows_that_grow = np.nonzero(growth[0])[0]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -614,8 +614,8 @@ def kinds_of(rule: GrowthRule, rates: Rates) -> BlockCycles | None:
         a = law_size(problem.mesh.dim, problem.sizes[c], pairs.K.shape[2])
         x = rates.response.sif[0][c].x
         nu, names = problem.elasticity.poisson_at(x), problem.elasticity.names_at(x)
-        every = rates_by_kind(rule, pairs, nu, c, place, a, names=names)
-        parts.append((every.dK.T[None], every.R.T[None], a[None]))
+        kinds = rates_by_kind(rule, pairs, nu, c, place, a, names=names)
+        parts.append((kinds.dK.T[None], kinds.R.T[None], a[None]))
     has_sets = isinstance(rule.law, LawSets) or isinstance(rule.retardation, RetardationSets)
     sets = problem.elasticity.sets_at(rates.stations.x) if has_sets else None
     dK, R, size = (

@@ -68,11 +68,11 @@ class Response:
         object.__setattr__(self, "sif", sif)
         for name in ("states", "solutions"):
             object.__setattr__(self, name, entries(getattr(self, name), f"Response: {name}"))
-        if not all(isinstance(each, SIF) for row in sif for each in row):
+        if not all(isinstance(answer, SIF) for row in sif for answer in row):
             raise ProblemError(
                 f"Response: sif = {value_text(self.sif)}: give a row of SIF a state."
             )
-        if not all(isinstance(each, Solution) for each in self.solutions):
+        if not all(isinstance(solution, Solution) for solution in self.solutions):
             raise ProblemError(
                 f"Response: solutions = {value_text(self.solutions)}: give those of solve."
             )
@@ -99,13 +99,13 @@ class Response:
         """Whether K may be no straight line over the factor: faces press, or nobody knows."""
         if not self.solutions:
             return True
-        return any(part is not None for each in self.solutions for part in each.contact)
+        return any(part is not None for solution in self.solutions for part in solution.contact)
 
     def scaled(self, factor: float) -> "Response":
         """The response to loads times a factor, of a scene in which all is in proportion."""
         return replace(
             self,
-            sif=tuple(tuple(each.scaled(factor) for each in state) for state in self.sif),
+            sif=tuple(tuple(answer.scaled(factor) for answer in state) for state in self.sif),
             solutions=tuple(solution.scaled(factor) for solution in self.solutions),
             load_factor=factor * self.load_factor,
         )
@@ -219,7 +219,7 @@ def respond(
     handed_on = new_solutions[0].reuse
     by_crack = [stress_intensities(new_solutions, c, bars) for c in range(len(problem.cracks))]
     light = handed_on.without_factor()
-    solutions = tuple(unchecked_copy(each, reuse=light, factored=None) for each in new_solutions)
+    solutions = tuple(unchecked_copy(s, reuse=light, factored=None) for s in new_solutions)
     sif = tuple(zip(*by_crack, strict=True))
     return unchecked(Response, states=states, sif=sif, solutions=solutions, reuse=handed_on)
 

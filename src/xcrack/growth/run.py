@@ -233,43 +233,43 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
     check_choice(rule.law, rule.cycle.ratio)
     settings = rule.settings  # before a law is called that may change what it reads
     steps_done = steps_to_go_on_from(rule, steps_done)
-    last, end = steps_done[-1] if steps_done else None, ""
+    last_step, end = steps_done[-1] if steps_done else None, ""
     if rule.estimates:
         rule = begin(rule)
     first_rule = rule  # on the mesh of no step in particular
-    if rule.estimates and last is not None:
-        rule = at_step(first_rule, run_state(last))
+    if rule.estimates and last_step is not None:
+        rule = at_step(first_rule, run_state(last_step))
     notices, progress = WarningLog(), Progress(rule)
     kink, is_torn = "", any(_alarm_of_segments(rule, step) for step in steps_done)
     try:
-        if last is None:
+        if last_step is None:
             with notices.watch(0) as messages:
                 first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
                 count = len(messages)
-                other = None
+                restart = None
                 if not nothing_grows(rule, first):  # where nothing does, no mesh is fine enough
-                    other = plan_again(first_rule, rule, None, first)
-                if other is not None:
-                    rule = other[0]
+                    restart = plan_again(first_rule, rule, None, first)
+                if restart is not None:
+                    rule = restart[0]
                     del messages[:count]  # of a mesh that is not used
                     first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
                 _warn_of_ratio(rule, first)
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
                 first = _with_validity(rule, first)
-            last = unchecked_copy(first, warnings=tuple(messages))
-            progress.step(last)
-            yield last
+            last_step = unchecked_copy(first, warnings=tuple(messages))
+            progress.step(last_step)
+            yield last_step
         else:
-            reuse = run_state(last).reuse
+            reuse = run_state(last_step).reuse
         while True:
-            end = end_of_run(rule, last) or refusal_of(rule, last)
+            end = end_of_run(rule, last_step) or refusal_of(rule, last_step)
             if end:
-                _refuse(last, end)
+                _refuse(last_step, end)
                 break
-            kink = kink or _warned_of_kink(rule, last)
-            with notices.watch(last.index + 1) as messages:
-                cut = last if rule.max_size is None else _cut_at_size(rule, last)
+            kink = kink or _warned_of_kink(rule, last_step)
+            with notices.watch(last_step.index + 1) as messages:
+                cut = last_step if rule.max_size is None else _cut_at_size(rule, last_step)
                 next_rule = rule if rule.cells is None else follow(first_rule, rule, cut)
                 reuse = reuse if next_rule is rule else reuse.without_matrices()
                 next_step, reuse, end = _step_after(next_rule, cut, reuse)
@@ -278,36 +278,36 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                 is_torn = is_torn or _warn_of_mode_III(next_rule, next_step)
                 count = len(messages)
                 estimates = next_rule.estimates
-                other = plan_again(first_rule, next_rule, cut, next_step) if estimates else None
-                if other is not None:
+                restart = plan_again(first_rule, next_rule, cut, next_step) if estimates else None
+                if restart is not None:
                     del messages[:count]  # of a step that is not handed over
                 else:
-                    if cut is not last:
+                    if cut is not last_step:
                         next_step = _with_mark(next_step)
                     next_step, reuse, end = _cut_at_end(
                         next_rule, cut, (next_step, reuse, end), messages
                     )
                     next_step = _with_validity(next_rule, next_step)
-            if other is not None:
-                reuse = reuse if other[0] is rule else run_state(last).reuse
-                rule, last = other[0], _with_plan(other[0], other[1] or last)
+            if restart is not None:
+                reuse = reuse if restart[0] is rule else run_state(last_step).reuse
+                rule, last_step = restart[0], _with_plan(restart[0], restart[1] or last_step)
                 continue
             rule = next_rule
             # Not kept with the step: a run that is resumed does not know the energy before.
             if alarm := alarm_of_energy(rule, cut, next_step):
                 warn(str(alarm))
-            last = unchecked_copy(next_step, warnings=tuple(messages))
-            progress.step(last)
-            yield last
+            last_step = unchecked_copy(next_step, warnings=tuple(messages))
+            progress.step(last_step)
+            yield last_step
             if end:
                 break
     finally:
         notices.summarise()
-        if end and last is not None:
-            alarm = alarm_of_life(rule, last, end)
+        if end and last_step is not None:
+            alarm = alarm_of_life(rule, last_step, end)
             if alarm is not None:
                 warn(str(alarm))
-        message = "" if last is None or not rule.estimates else shortfall(rule, last)
+        message = "" if last_step is None or not rule.estimates else shortfall(rule, last_step)
         if message:
             warn(message)
         progress.close()
@@ -335,7 +335,7 @@ _TRIES = 6  # solves for that
 
 def _cut_at_end(
     rule: GrowthRule,
-    last: Step,
+    last_step: Step,
     ending: tuple[Step, SolverState, str],
     messages: list[str],
 ) -> tuple[Step, SolverState, str]:
@@ -344,7 +344,7 @@ def _cut_at_end(
     Parameters
     ----------
     rule : GrowthRule
-    last : Step
+    last_step : Step
         The one before.
     ending : (Step, SolverState, str)
         The whole step, what the next solve starts from, and why the run ends there, if it does.
@@ -356,19 +356,19 @@ def _cut_at_end(
     The false position by Dowell and Jarratt (1971, BIT 11, 168, "Illinois"), between the ends of
     the step, each time with a solve. No advance is below a tenth of a cell, which no mesh sees.
     """
-    plan, is_break = plan_of(last), bool(law_reaches_toughness(rule, ending[0]))
-    low, high = 0.0, plan.length * plan.part
-    at_high = beyond_end(rule, ending[0], is_break) - _AIM
-    if at_high <= _AIM:
+    plan, is_break = plan_of(last_step), bool(law_reaches_toughness(rule, ending[0]))
+    lower_length, upper_length = 0.0, plan.length * plan.part
+    at_upper = beyond_end(rule, ending[0], is_break) - _AIM
+    if at_upper <= _AIM:
         return ending
-    at_low = max(beyond_end(rule, last, is_break), -1.0) - _AIM
+    at_lower = max(beyond_end(rule, last_step, is_break), -1.0) - _AIM
     least_length, reuse, bound = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip]), ending[1], ""
     for _ in range(_TRIES):
-        length = low + (high - low) * at_low / (at_low - at_high)
+        length = lower_length + (upper_length - lower_length) * at_lower / (at_lower - at_upper)
         length = max(length, least_length)
-        if length >= high - 1e-3 * least_length:
+        if length >= upper_length - 1e-3 * least_length:
             break
-        shorter_step = _with_length(rule, last, length)
+        shorter_step = _with_length(rule, last_step, length)
         if plan_of(shorter_step).limit:
             break
         messages_before = messages[:]
@@ -379,40 +379,40 @@ def _cut_at_end(
             messages[:] = messages_before
             if step is None:
                 break
-            low, at_low = length, excess
-            at_high *= 0.5 if bound == "high" else 1.0
-            bound = "high"
+            lower_length, at_lower = length, excess
+            at_upper *= 0.5 if bound == "upper" else 1.0
+            bound = "upper"
             continue
         ending = _with_mark(step), reuse, end
-        high, at_high = length, excess
+        upper_length, at_upper = length, excess
         if excess <= _AIM:
             break
-        at_low *= 0.5 if bound == "low" else 1.0
-        bound = "low"
+        at_lower *= 0.5 if bound == "lower" else 1.0
+        bound = "lower"
     return ending
 
 
 _SAME = 1e-10  # of a length that was asked for
 
 
-def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
+def _cut_at_size(rule: GrowthRule, step: Step) -> Step:
     """A step shortened to end where a crack has the size `max_size`, found from the cracks alone.
 
     A rest of less than a tenth of a cell is avoided: then this step leaves that much.
     """
     from scipy.optimize import brentq
 
-    plan = plan_of(last)
+    plan = plan_of(step)
     least_length = (1 + 1e-6) * LEAST * float(plan.cell[plan.tip])
     planned_length = plan.length * plan.part
 
     def length_beyond(length: float) -> float:
-        return size_beyond(rule, _scene(rule, _with_length(rule, last, length)).sizes)
+        return size_beyond(rule, _scene(rule, _with_length(rule, step, length)).sizes)
 
     try:
         at_end, at_begin = (
-            size_beyond(rule, _scene(rule, last).sizes),
-            size_beyond(rule, last.sizes),
+            size_beyond(rule, _scene(rule, step).sizes),
+            size_beyond(rule, step.sizes),
         )
         if at_end <= _SAME:
             slope = (at_end - at_begin) / planned_length
@@ -422,18 +422,18 @@ def _cut_at_size(rule: GrowthRule, last: Step) -> Step:
                 or -at_end >= slope * least_length
             )
             return (
-                last
+                step
                 if is_there
-                else _with_length(rule, last, planned_length - least_length - at_end / slope)
+                else _with_length(rule, step, planned_length - least_length - at_end / slope)
             )
         if length_beyond(least_length) >= 0:
-            return _with_length(rule, last, least_length)
+            return _with_length(rule, step, least_length)
         length = brentq(
             length_beyond, least_length, planned_length, xtol=_SAME * least_length, rtol=1e-15
         )
-        return _with_length(rule, last, length)
+        return _with_length(rule, step, length)
     except (GeometryError, ProblemError):  # the step itself says why it cannot be taken
-        return last
+        return step
 
 
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
@@ -479,51 +479,51 @@ def _warn_of_left_out(rule: GrowthRule, first: Step) -> None:
 
 
 def _step_after(
-    rule: GrowthRule, last: Step, reuse: SolverState
+    rule: GrowthRule, last_step: Step, reuse: SolverState
 ) -> tuple[Step | None, SolverState, str]:
     """The step after another one, or why there is none."""
-    plan = plan_of(last)
+    plan = plan_of(last_step)
     try:
-        problem = _scene(rule, last)
+        problem = _scene(rule, last_step)
     except GeometryError as error:
-        return None, reuse, cannot_go_on(last, error)
+        return None, reuse, cannot_go_on(last_step, error)
     if plan.joins:
-        slip = reuse.slip if len(plan.cracks) == len(last.cracks) else ()
+        slip = reuse.slip if len(plan.cracks) == len(last_step.cracks) else ()
         reuse = replace(reuse, centre=(), active=(), slip=slip)
-    joins_of_step = joins_of(last, problem)
+    joins_of_step = joins_of(last_step, problem)
     try:
-        end = cut_off(last, problem, joins_of_step)
+        end = cut_off(last_step, problem, joins_of_step)
     except GeometryError as error:
-        return None, reuse, cannot_go_on(last, error)
+        return None, reuse, cannot_go_on(last_step, error)
     if joins_of_step and problem.mesh.dim == 2:
         reuse = SolverState()  # what belongs to numbers of cracks is void
-    arrivals_ahead = coming_arrivals(last, problem)
+    arrivals_ahead = coming_arrivals(last_step, problem)
     if not any(placed_crack.n_tips for placed_crack in problem.placed):
-        step = _last_step(rule, last, problem, arrivals_ahead, joins_of_step)
+        step = _last_step(rule, last_step, problem, arrivals_ahead, joins_of_step)
         return step, reuse, end
     if end:
         return None, reuse, end
     try:
         step, reuse = _solved_step(
-            rule, problem, last, reuse, run_state(last).settings, joins_of_step
+            rule, problem, last_step, reuse, run_state(last_step).settings, joins_of_step
         )
-        arrivals = arrivals_of(rule, last, arrivals_ahead, step.cycles - last.cycles)
+        arrivals = arrivals_of(rule, last_step, arrivals_ahead, step.cycles - last_step.cycles)
         return unchecked_copy(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
-        return None, reuse, cannot_go_on(last, error)
+        return None, reuse, cannot_go_on(last_step, error)
     except XcrackError as error:
         if not have_left(plan.cracks, problem.placed):
-            piece = piece_cut_off(last, problem) if problem.junctions else ""
+            piece = piece_cut_off(last_step, problem) if problem.junctions else ""
             if not piece:
                 raise
-            return None, reuse, f"{piece}, after step {last.index}, N = {last.cycles:.6g}"
-        words = left_the_body(rule, arrivals_of(rule, last, arrivals_ahead, None))
+            return None, reuse, f"{piece}, after step {last_step.index}, N = {last_step.cycles:.6g}"
+        words = left_the_body(rule, arrivals_of(rule, last_step, arrivals_ahead, None))
         return None, reuse, f"{words}, and the body cannot be solved without it: {error}"
 
 
-def _scene(rule: GrowthRule, last: Step) -> Problem:
+def _scene(rule: GrowthRule, step: Step) -> Problem:
     """The scene after the plan of a step, with the radius of the first."""
-    problem = problem_with_cracks(rule.problem, plan_of(last).cracks, run_state(last).radius)
+    problem = problem_with_cracks(rule.problem, plan_of(step).cracks, run_state(step).radius)
     _ = problem.placed  # an error here ends a run
     return problem
 
@@ -534,7 +534,7 @@ _AGREES = 40  # times, until loads and cycles of a solve agree
 def _solved_step(
     rule: GrowthRule,
     problem: Problem,
-    last: Step | None,
+    last_step: Step | None,
     reuse: SolverState,
     settings: Mapping[str, str],
     joins_of_step: Sequence[Join] = (),
@@ -546,27 +546,29 @@ def _solved_step(
     """
     is_foretold = False
     may_foretell = may_foretell and rule.estimates and not joins_of_step
-    if may_foretell and last is not None and bars_are_foretold(rule, last):
-        if rule.max_steps is not None and last.index + 2 >= rule.max_steps:
+    if may_foretell and last_step is not None and bars_are_foretold(rule, last_step):
+        if rule.max_steps is not None and last_step.index + 2 >= rule.max_steps:
             # The last step has bars of its own; of a run that goes on it is one among others.
             step, handed_on = _solved_step(
-                rule, problem, last, reuse, settings, joins_of_step, False
+                rule, problem, last_step, reuse, settings, joins_of_step, False
             )
             return _with_mark(step), handed_on
         response = respond_to_states(rule, problem, reuse)
-        with_bars = foretold_bars(last.sif, response.sif)
+        with_bars = foretold_bars(last_step.sif, response.sif)
         if with_bars is None:
-            return _solved_step(rule, problem, last, response.reuse, settings, joins_of_step, False)
+            return _solved_step(
+                rule, problem, last_step, response.reuse, settings, joins_of_step, False
+            )
         response, is_foretold = replace(response, sif=with_bars), True
     elif rule.load_program is None:
         response = respond_to_states(rule, problem, reuse, rule.estimates)
     else:
-        N = 0.0 if last is None else last.cycles + plan_of(last).cycles
+        N = 0.0 if last_step is None else last_step.cycles + plan_of(last_step).cycles
         response = respond_under_program(rule, problem, reuse, rule.estimates, N)
     sif, solutions, handed_on = response.sif, response.solutions, response.reuse
     rates = rates_of(rule, problem, unchecked_copy(response, sif=best_K(sif)))
     integrator = integrator_of(rule)
-    if last is None:
+    if last_step is None:
         index, radius = 0, rule.problem.numerics.radius
         identities = first_identities(problem.placed)
         result = integrator.begin(rule, rates, identities)
@@ -574,10 +576,10 @@ def _solved_step(
         if radius is None and rule.tolerance is None and has_tip_functions:
             radius = float(np.min(solutions[0].space.radius))
     else:
-        index, radius = last.index + 1, run_state(last).radius
-        identities = _identities(rule, last, problem, joins_of_step)
-        correct = joins_3d.correct_join if plan_of(last).joins else integrator.correct
-        result = correct(rule, last, rates, identities)
+        index, radius = last_step.index + 1, run_state(last_step).radius
+        identities = _identities(rule, last_step, problem, joins_of_step)
+        correct = joins_3d.correct_join if plan_of(last_step).joins else integrator.correct
+        result = correct(rule, last_step, rates, identities)
         for _ in range(_AGREES if rule.follows_cycles else 0):  # the cycles were foretold
             change = load_factor_at(rule, problem, result.cycles) / response.load_factor
             if abs(change - 1) < _SAME:
@@ -585,9 +587,9 @@ def _solved_step(
             response = response.scaled(sqrt(change))  # half of it: fewer cycles, smaller loads
             sif, solutions = response.sif, response.solutions
             rates = rates_of(rule, problem, unchecked_copy(response, sif=best_K(sif)))
-            result = correct(rule, last, rates, identities)
+            result = correct(rule, last_step, rates, identities)
     if rule.estimates:
-        result = add_K_error(rule, last, result, rates, sif, is_foretold)
+        result = add_K_error(rule, last_step, result, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
     step = unchecked(
         Step,
@@ -627,7 +629,7 @@ def _solved_step(
     step = _with_plan(rule, step)
     if is_foretold and (step.plan is None or step.plan.limit or end_of_run(rule, step)):
         step, handed_on = _solved_step(
-            rule, problem, last, handed_on, settings, joins_of_step, False
+            rule, problem, last_step, handed_on, settings, joins_of_step, False
         )
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
@@ -647,18 +649,18 @@ def _with_plan(rule: GrowthRule, step: Step) -> Step:
 
 
 def _identities(
-    rule: GrowthRule, last: Step, problem: Problem, joins_of_step: Sequence[Join]
+    rule: GrowthRule, step: Step, problem: Problem, joins_of_step: Sequence[Join]
 ) -> Identities:
     """Which tips, fronts and cracks those of the next scene are."""
-    identities_before = last.identities or first_identities(last.cracks)
-    numbers = numbers_after(len(last.cracks), joins_of_step, len(problem.placed))
-    place = integrator_of(rule).ends_of(last, plan_of(last))
-    return identities_after(identities_before, numbers, solves_of(last)[0], place, problem.placed)
+    identities_before = step.identities or first_identities(step.cracks)
+    numbers = numbers_after(len(step.cracks), joins_of_step, len(problem.placed))
+    place = integrator_of(rule).ends_of(step, plan_of(step))
+    return identities_after(identities_before, numbers, solves_of(step)[0], place, problem.placed)
 
 
 def _last_step(
     rule: GrowthRule,
-    last: Step,
+    step: Step,
     problem: Problem,
     arrivals_ahead: Sequence[Arriving],
     joins_of_step: Sequence[Join],
@@ -667,41 +669,41 @@ def _last_step(
 
     Its cycles are those of the last tip.
     """
-    plan = plan_of(last)
-    arrivals = arrivals_of(rule, last, arrivals_ahead, None)
+    plan = plan_of(step)
+    arrivals = arrivals_of(rule, step, arrivals_ahead, None)
     cracks = tuple(
-        ended_crack(planned_crack, placed_crack, [one for one in arrivals_ahead if one.crack == c])
+        ended_crack(planned_crack, placed_crack, [a for a in arrivals_ahead if a.crack == c])
         for c, (planned_crack, placed_crack) in enumerate(
             zip(plan.cracks, problem.placed, strict=True)
         )
     )
     no_places = tuple(np.zeros(0) for _ in cracks)
-    cycles = max((arrival.cycles for arrival in arrivals), default=last.cycles)
-    error = last.error
+    cycles = max((arrival.cycles for arrival in arrivals), default=step.cycles)
+    error = step.error
     if error is not None:  # no K has been solved for the last ligament: its cycles count in full
-        unknown_cycles = error.unknown + cycles - last.cycles
+        unknown_cycles = error.unknown + cycles - step.cycles
         error = replace(error, place=no_places, newest_place=(), unknown=unknown_cycles)
     return Step(
-        index=last.index + 1,
+        index=step.index + 1,
         cycles=max([cycles, *(join.N for join in joins_of_step)]),
         cracks=cracks,
         # Two cracks may have become one.
-        sif=tuple(tuple(map(_without_stations, state[: len(cracks)])) for state in last.sif),
+        sif=tuple(tuple(map(_without_stations, state[: len(cracks)])) for state in step.sif),
         angle=no_places,
         dK_eq=no_places,
         R=no_places,
         rate=no_places,
         da=no_places,
-        levels=last.levels,
+        levels=step.levels,
         error=error,
         arrivals=arrivals,
         joins=tuple(joins_of_step),
-        states=last.states,
+        states=step.states,
         law_rate=no_places,
         R_range=tuple(np.zeros((0, 2)) for _ in cracks),
         sizes=tuple(crack_size(cracks, c, problem.mesh) for c in range(len(cracks))),
-        identities=_identities(rule, last, problem, joins_of_step),
-        run=last.run,
+        identities=_identities(rule, step, problem, joins_of_step),
+        run=step.run,
     )
 
 

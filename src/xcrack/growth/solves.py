@@ -75,11 +75,11 @@ class SolveHistory:
         """σ of the newest solve, length."""
         return float(self.sigma[-1])
 
-    def last(self, count: int) -> "SolveHistory":
+    def last_solves(self, count: int) -> "SolveHistory":
         """The same with the last few solves only."""
         return self._of_solves(slice(max(self.n_solves - count, 0), None))
 
-    def first(self, count: int) -> "SolveHistory":
+    def first_solves(self, count: int) -> "SolveHistory":
         """The same without the newest solves."""
         return self._of_solves(slice(0, count))
 
@@ -109,7 +109,7 @@ class SolveHistory:
             exponent=exponent,
             kinds=None,
         )
-        return replace(with_new.last(KEPT), kinds=kinds)
+        return replace(with_new.last_solves(KEPT), kinds=kinds)
 
     def with_direction(self, direction: Floats) -> "SolveHistory":
         """The same with other directions `(n, d)` at the newest solve."""
@@ -117,8 +117,8 @@ class SolveHistory:
 
     def angles(self, frame: Floats) -> Floats:
         """Angles of the directions in frames `(k, n)`, without jumps by a full turn, rad."""
-        local = np.einsum("nij,knj->kin", frame[:, :2], self.direction)
-        angle = np.arctan2(local[:, 1], local[:, 0])
+        components = np.einsum("nij,knj->kin", frame[:, :2], self.direction)
+        angle = np.arctan2(components[:, 1], components[:, 0])
         if np.abs(angle[1:] - angle[:-1]).max(initial=0.0) > np.pi:
             for k in range(len(angle) - 2, -1, -1):
                 angle[k] += 2 * np.pi * np.round((angle[k + 1] - angle[k]) / (2 * np.pi))
@@ -185,9 +185,9 @@ def _curve(nodes: Floats, values: Floats, x: Floats) -> Floats:
         return result
     new_nodes = nodes[2:]
     shares_there = _line_shares(nodes, new_nodes)
-    first, last = np.exp(2 * (nodes[:2] - new_nodes))
-    bends = np.exp(2 * (x - new_nodes)) - (line[0] * first + line[1] * last)
-    weight_of_bend = 1.0 - (shares_there[0] * first + shares_there[1] * last)
+    first_bend, last_bend = np.exp(2 * (nodes[:2] - new_nodes))
+    bends = np.exp(2 * (x - new_nodes)) - (line[0] * first_bend + line[1] * last_bend)
+    weight_of_bend = 1.0 - (shares_there[0] * first_bend + shares_there[1] * last_bend)
     return (
         result
         + (values[2:] - (shares_there[0] * values[0] + shares_there[1] * values[1]))
@@ -236,31 +236,31 @@ def _sum(shares: Sequence[Floats], values: Floats) -> Floats:
 
 
 def bisected_length(
-    is_true: Callable[[float], bool], largest: float, times: int = 40
+    is_true: Callable[[float], bool], max_length: float, times: int = 40
 ) -> tuple[float, float]:
-    """Lengths between which a condition ceases to hold, in [0, most].
+    """Lengths between which a condition ceases to hold, in [0, max_length].
 
     Parameters
     ----------
     is_true : callable length -> bool
-        True at 0, false at `largest`.
-    largest : float
+        True at 0, false at `max_length`.
+    max_length : float
     times : int
-        The two lengths are most / 2^times apart.
+        The two lengths are max_length / 2^times apart.
 
     Returns
     -------
-    low, high : float
-        It holds at `low`, or low is 0; not at `high`, or high is `largest`.
+    lower_length, upper_length : float
+        It holds at `lower_length`, or that is 0; not at `upper_length`, or that is `max_length`.
     """
-    low, high = 0.0, largest
+    lower_length, upper_length = 0.0, max_length
     for _ in range(times):
-        middle = 0.5 * (low + high)
+        middle = 0.5 * (lower_length + upper_length)
         if is_true(middle):
-            low = middle
+            lower_length = middle
         else:
-            high = middle
-    return low, high
+            upper_length = middle
+    return lower_length, upper_length
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,11 +347,11 @@ class Stretch:
             return _Pieces(self.solves.sigma, s, np.ones(len(share)), share, arc, cycles)
         s, weight = self.start + length * _POINTS, length * _WEIGHTS
         rate = rates_at(self.solves, s, self.threshold)
-        largest = rate.max(axis=1, initial=0.0)
-        is_growing = largest > 0
-        safe_largest = np.where(is_growing, largest, 1.0)
-        share = np.where(is_growing[:, None], rate / safe_largest[:, None], 0.0)
-        cycles = float(weight @ np.where(is_growing, 1 / safe_largest, 0.0))
+        fastest_rate = rate.max(axis=1, initial=0.0)
+        is_growing = fastest_rate > 0
+        safe_rate = np.where(is_growing, fastest_rate, 1.0)
+        share = np.where(is_growing[:, None], rate / safe_rate[:, None], 0.0)
+        cycles = float(weight @ np.where(is_growing, 1 / safe_rate, 0.0))
         return _Pieces(self.solves.sigma, s, weight, share, weight @ share, cycles)
 
     def growth(self, frame: Floats, angle: Floats, length: float | None = None) -> Growth:

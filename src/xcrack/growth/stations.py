@@ -61,19 +61,16 @@ class GrowthStations(Stations):
         """Length of the growth that waits `(n,)`."""
         return np.linalg.norm(self.offset, axis=1)
 
-    def growth(self, rate: Floats, largest: float) -> Floats:
+    def growth(self, rate: Floats, advance: float) -> Floats:
         """Growth in proportion to rates, the largest as given, on top of what waits `(n,)`."""
-        return np.asarray(self.waiting_length + largest * (rate / rate.max()))
+        return np.asarray(self.waiting_length + advance * (rate / rate.max()))
 
 
 def solved_stations(sif: Sequence[SIF]) -> Stations:
     """Stations at which K of all cracks was solved, from K of one load state."""
     return Stations(
-        np.repeat(np.arange(len(sif)), [len(each.x) for each in sif]),
-        *(
-            np.concatenate([getattr(each, name) for each in sif])
-            for name in ("front", "s", "x", "frame")
-        ),
+        np.repeat(np.arange(len(sif)), [len(s.x) for s in sif]),
+        *(np.concatenate([getattr(s, name) for s in sif]) for name in ("front", "s", "x", "frame")),
     )
 
 
@@ -194,8 +191,8 @@ def _identities_at(end: Ints, place: Floats, points: Sequence[Floats]) -> list[i
     if not len(end) or not len(points):
         return result
     number = np.repeat(np.arange(len(points)), [len(x) for x in points])
-    nearest = end[cKDTree(place).query(np.concatenate(points))[1]]
-    pairs, count = np.unique(np.stack([number, nearest], axis=1), axis=0, return_counts=True)
+    nearest_end = end[cKDTree(place).query(np.concatenate(points))[1]]
+    pairs, count = np.unique(np.stack([number, nearest_end], axis=1), axis=0, return_counts=True)
     for k in np.argsort(-count, kind="stable").tolist():
         front, claimed_front = pairs[k].tolist()
         if result[front] < 0 and claimed_front not in result:
@@ -235,12 +232,12 @@ class CellSizes:
         )
         return cells_that_stay.with_places(CellSizes(x, size, np.ones(len(x), dtype=bool)))
 
-    def with_places(self, other: "CellSizes") -> "CellSizes":
+    def with_places(self, cells: "CellSizes") -> "CellSizes":
         """With the places of another one too."""
         return CellSizes(
-            np.concatenate([self.x, other.x]),
-            np.concatenate([self.size, other.size]),
-            np.concatenate([self.moves, other.moves]),
+            np.concatenate([self.x, cells.x]),
+            np.concatenate([self.size, cells.size]),
+            np.concatenate([self.moves, cells.moves]),
         )
 
 

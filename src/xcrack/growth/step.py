@@ -114,15 +114,15 @@ class Join(Event):
             raise ProblemError(
                 f"Join: cracks = {value_text(self.cracks)}: give the numbers of two."
             )
-        first, second = (whole_number(c, "Join: cracks", least=0) for c in pair)
-        object.__setattr__(self, "cracks", (first, second))
+        first_crack, second_crack = (whole_number(c, "Join: cracks", least=0) for c in pair)
+        object.__setattr__(self, "cracks", (first_crack, second_crack))
 
     def __str__(self) -> str:
-        first, second = self.cracks
+        first_crack, second_crack = self.cracks
         place = coordinates(self.point)
-        if first == second:
-            return f"the ligament inside crack {first} breaks at {place}, N = {self.N:.6g}"
-        return f"cracks {first} and {second} join at {place}, N = {self.N:.6g}"
+        if first_crack == second_crack:
+            return f"the ligament inside crack {first_crack} breaks at {place}, N = {self.N:.6g}"
+        return f"cracks {first_crack} and {second_crack} join at {place}, N = {self.N:.6g}"
 
 
 def checked_joins(value: Sequence[Join], what: str) -> tuple[Join, ...]:
@@ -147,8 +147,8 @@ def numbers_after(n: int, joins_of_step: Sequence[Join], n_left: int) -> list[in
     """
     number = list(range(n))
     for join in joins_of_step[len(joins_of_step) - (n - n_left) :]:
-        one, other = sorted(number[c] for c in join.cracks)
-        number = [one if c == other else c - (c > other) for c in number]
+        kept_number, lost_number = sorted(number[c] for c in join.cracks)
+        number = [kept_number if c == lost_number else c - (c > lost_number) for c in number]
     return number
 
 
@@ -619,10 +619,10 @@ class Step:
             There is none of these numbers.
         """
         crack = whole_number(crack, "end_name: crack", least=0, most=len(self.cracks) - 1)
-        last = self.cracks[crack].n_tips - 1
-        if last < 0:
+        last_number = self.cracks[crack].n_tips - 1
+        if last_number < 0:
             raise ProblemError(f"end_name: crack {crack} has no end left in step {self.index}.")
-        number = whole_number(number, "end_name: number", least=0, most=last)
+        number = whole_number(number, "end_name: number", least=0, most=last_number)
         if self.identities is None:
             word = "tip" if self.cracks[crack].fronts is None else "front"
             return f"{word} {number} of crack {crack}"

@@ -138,7 +138,7 @@ def first_control(rule: GrowthRule, size: float, least_length: float, room: floa
 
 def next_control(
     rule: GrowthRule,
-    last: StepControl,
+    last_control: StepControl,
     length: float,
     path_error: float,
     off_cycles: float,
@@ -153,7 +153,7 @@ def next_control(
     Parameters
     ----------
     rule : GrowthRule
-    last : StepControl
+    last_control : StepControl
         Of the step that is done.
     length, path_error, off_cycles, cycles, cycles_before, way
         As of `step_error`.
@@ -171,7 +171,7 @@ def next_control(
         STEPS * rule.tolerance,
         way,
     )
-    target = next_length(length, error, last.error, least_length)
+    target = next_length(length, error, last_control.error, least_length)
     return StepControl(_length_in_room(rule, target, room, least_length), error, least_length)
 
 

@@ -132,7 +132,7 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
 def _piece_ahead(rule: GrowthRule, step: Step) -> tuple[Stretch, bool]:
     """The next step of σ without regard to boundaries, and whether all tips stop growing in it."""
     solves = solves_of(step)[1]
-    last_solves = solves.last(2)
+    last_solves = solves.last_solves(2)
     length = longest_advance(rule, step.control)
     if rule.cycles is not None:
         fastest_rate = float(solves.rate[-1].max(initial=0.0))
@@ -159,7 +159,7 @@ def _up_to_interfaces(
 ) -> tuple[Stretch, Growth]:
     """A step that ends before an interface, or behind it with the law there at the last known K."""
     stations, solves = solves_of(step)
-    history = solves.last(2)
+    history = solves.last_solves(2)
     goal = np.where(growth.arc > interfaces.stop, interfaces.goal, np.inf)
     largest_length, row = stretch.length, int(np.argmax(growth.arc))
     is_crossing = np.isfinite(goal) & (goal > interfaces.way)
@@ -286,7 +286,7 @@ def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> t
         return growth, 0.0
     stations, solves = solves_of(step)
     rate, m, radius = solves.rate[-1], solves.exponent, _radii(step)
-    best = growth.cycles, 0.0
+    best_estimate = growth.cycles, 0.0
     for meeting in facing_pairs:
         i, k = meeting.tip, meeting.other
         gap, speed = float(np.linalg.norm(stations.x[k] - stations.x[i])), float(rate[i] + rate[k])
@@ -294,9 +294,9 @@ def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> t
             continue
         cycles_at_first_rate = gap / speed
         cycles = cycles_at_first_rate * part_of_time(2 * gap / float(radius[i] + radius[k]), m, 2)
-        if cycles < best[0]:
-            best = cycles, UNKNOWN_OF_TIPS * (cycles_at_first_rate - cycles)
-    cycles, cycle_error = best
+        if cycles < best_estimate[0]:
+            best_estimate = cycles, UNKNOWN_OF_TIPS * (cycles_at_first_rate - cycles)
+    cycles, cycle_error = best_estimate
     share = cycles / growth.cycles if growth.cycles > 0 else 1.0
     is_meeting = np.isin(
         np.arange(len(rate)),
@@ -488,39 +488,39 @@ def _stations(
     )
 
 
-def correct(rule: GrowthRule, last: Step, rates: Rates, identities: Identities) -> Corrected:
+def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) -> Corrected:
     """Correct a predicted step by what was solved there."""
-    plan = plan_of(last)
-    rows = _rows_that_stay(ends_of(last, plan), rates.cracks)
+    plan = plan_of(step)
+    rows = _rows_that_stay(ends_of(step, plan), rates.cracks)
     if len(rows) < len(plan.arc):
-        return _without_lost_tips(rule, last, rates, identities, rows)
+        return _without_lost_tips(rule, step, rates, identities, rows)
     if np.isinf(rates.rate).any():
-        return _last_step_of_run(last, rates, identities)
-    interfaces = interfaces_ahead(rule, solves_of(last)[0].x, plan.move)
+        return _last_step_of_run(step, rates, identities)
+    interfaces = interfaces_ahead(rule, solves_of(step)[0].x, plan.move)
     if interfaces is not None and (plan.arc > interfaces.way).any():
-        return _step_through_interface(rule, last, rates, identities, interfaces)
-    return _corrected_points(rule, last, rates, identities)
+        return _step_through_interface(rule, step, rates, identities, interfaces)
+    return _corrected_points(rule, step, rates, identities)
 
 
 def _step_through_interface(
-    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, interfaces: InterfacesAhead
+    rule: GrowthRule, step: Step, rates: Rates, identities: Identities, interfaces: InterfacesAhead
 ) -> Corrected:
     """A step in which tips have passed an interface: each part counts by the law of its material.
 
     Where only the laws differ, K is a power of the length between both solves. Where the stiffness
     differs, K is extrapolated up to the interface, and behind it is that at the end of the step.
     """
-    plan, error = plan_of(last), _error(last)
-    stations, old_solves = solves_of(last)
+    plan, error = plan_of(step), _error(step)
+    stations, old_solves = solves_of(step)
     is_crossing = plan.arc > interfaces.way
     kinds = kinds_of(rule, rates)
-    begin = old_solves.last(1)
+    begin = old_solves.last_solves(1)
     solves_now = begin.with_solve(
         plan.end, rates.law_rate, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
     )
     jumps = is_crossing & ~interfaces.is_smooth
     rate_here = np.where(
-        jumps, rates_at(old_solves.last(2), np.array([plan.end]))[0], rates.law_rate
+        jumps, rates_at(old_solves.last_solves(2), np.array([plan.end]))[0], rates.law_rate
     )
     rate_there = np.where(jumps, rates.law_rate, begin.rate[0])
     is_smooth = is_crossing & interfaces.is_smooth
@@ -528,7 +528,7 @@ def _step_through_interface(
         sets = np.where(is_smooth, interfaces.set_before, interfaces.set_after)
         rate_before = rates_by_law_of(rule, rates.problem, rates.response, sets)
         rate_here = np.where(is_smooth, rate_before, rate_here)
-        rate_there = np.where(is_smooth, rates_behind(rule, last, interfaces), rate_there)
+        rate_there = np.where(is_smooth, rates_behind(rule, step, interfaces), rate_there)
     history = old_solves.with_solve(
         plan.end, rate_here, rates.dK_eq, rates.direction, rates.exponent(rule.law), kinds
     )
@@ -550,7 +550,7 @@ def _step_through_interface(
 
     def solves_in(is_passed: Bools) -> SolveHistory:
         return (
-            mixed_solves(history.last(2), solves_after, interfaces.set_after, is_passed)
+            mixed_solves(history.last_solves(2), solves_after, interfaces.set_after, is_passed)
             if is_passed.any()
             else history
         )
@@ -564,21 +564,21 @@ def _step_through_interface(
             goal,
             plan.sigma,
             largest_length,
-            last.zones,
+            step.zones,
         )
         if (passage_done.growth.arc >= goal * (1 - 1e-9)).any():
             break
     cycles, cycles_at = passage_done.growth.cycles, np.array(passage_done.cycles_at)
     row = int(np.argmax(np.where(jumps, plan.arc, -1.0)))
-    if jumps[row] and last.zones is None and rates.rate[row] > 0:
+    if jumps[row] and step.zones is None and rates.rate[row] > 0:
         way_behind = float(plan.arc[row] - interfaces.way[row])
-        first, second = cycles_of_jump(
+        cycles_before, cycles_behind = cycles_of_jump(
             old_solves, history.exponent, float(rates.law_rate[row]), row,
             float(interfaces.way[row]), way_behind,
             float(interfaces.power[row]),
         )  # fmt: skip
-        cycles, cycles_at[row] = first + second, first
-    warn_of_passages(rule, last, interfaces, cycles_at)
+        cycles, cycles_at[row] = cycles_before + cycles_behind, cycles_before
+    warn_of_passages(rule, step, interfaces, cycles_at)
     after_it = _stations(
         rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves
     )
@@ -587,12 +587,12 @@ def _step_through_interface(
     own_error = share_left(rule) * abs(cycles - plan.cycles) + plan.error
     own_error += solves.exponent * error.behind * cycles
     return Corrected(
-        last.cycles + cycles,
+        step.cycles + cycles,
         rates.cracks,
         after_it,
         solves,
         StepError(error.place, error.cycles + own_error, behind=error.behind),
-        last.control if goes_on else _first_length(rule, after_it, solves, rates),
+        step.control if goes_on else _first_length(rule, after_it, solves, rates),
         passage_done.zones,
     )
 
@@ -610,45 +610,45 @@ def _with_jumps(solves: SolveHistory, jumps: Bools, k: int) -> SolveHistory:
 
 
 def _corrected_points(
-    rule: GrowthRule, last: Step, rates: Rates, identities: Identities
+    rule: GrowthRule, step: Step, rates: Rates, identities: Identities
 ) -> Corrected:
     """Correct the last points by the parabola through the last three solves."""
-    plan, error = plan_of(last), _error(last)
-    stations, old_solves = solves_of(last)
+    plan, error = plan_of(step), _error(step)
+    stations, old_solves = solves_of(step)
     faces = last_faces(rates.cracks)
     solves = old_solves.with_solve(
         plan.end, rates.law_rate, rates.dK_eq, rates.direction, rates.exponent(rule.law),
         kinds_of(rule, rates),
     )  # fmt: skip
-    stretch = stretch_of(rule, solves, plan.sigma, plan.length, last.zones)
+    stretch = stretch_of(rule, solves, plan.sigma, plan.length, step.zones)
     frame = rates.stations.frame
     angle = solves.angles(frame)
     solved_angle = np.array(angle[-1])
     gamma = np.where(plan.moves, turn_of_faces(rates, faces.length), 0.0)
-    old_faces = last_faces(last.corrected)
+    old_faces = last_faces(step.corrected)
     is_replaced = moved_on(old_faces, stations.fresh, plan.cell)
     begin_of_face = np.where(is_replaced[:, None], old_faces.anchor, old_faces.tip)
     growth = Growth(plan.move, plan.arc, plan.cycles)
     for _ in range(_PASSES):
         growth = stretch.growth(frame, angle)
         face = stations.x + growth.move - begin_of_face
-        local = np.einsum("nij,nj->in", frame, face)
-        angle[-1] = solved_angle + gamma * np.arctan2(local[1], local[0])
+        components = np.einsum("nij,nj->in", frame, face)
+        angle[-1] = solved_angle + gamma * np.arctan2(components[1], components[0])
     solves = solves.with_direction(replace(rates, angle=angle[-1]).direction)
     x = stations.x + growth.move
     try:
-        cracks, moves = with_tips_at(last.corrected, x, stations.fresh, plan.cell)
+        cracks, moves = with_tips_at(step.corrected, x, stations.fresh, plan.cell)
     except GeometryError:  # which the predicted cracks are free of
         x, cracks, moves = stations.x + plan.move, list(rates.cracks), plan.moves
     gap = x - (stations.x + plan.move)
-    spans = _spans(rule, last, stretch)
-    by_places = _places(rule, last, solves, spans, frame, gap)
+    spans = _spans(rule, step, stretch)
+    by_places = _places(rule, step, solves, spans, frame, gap)
     known_error, newest_error = by_places.known_error, by_places.newest_error
-    cycles, of_life = _cycles(rule, last, spans, growth)
+    cycles, of_life = _cycles(rule, step, spans, growth)
     lag = _OF_LENGTH * by_places.errors_ahead / solves.scale
     lag_behind = error.behind + float(lag[0].max(initial=0.0))
     # What an end lags behind by after this step counts in all cycles that follow.
-    whole_cycles = max(growth.cycles, PAST * last.cycles)
+    whole_cycles = max(growth.cycles, PAST * step.cycles)
     cycle_error_alone = (
         of_life.own_error + solves.exponent * float(lag.sum(axis=0).max(initial=0.0)) * whole_cycles
     )
@@ -659,9 +659,9 @@ def _corrected_points(
     drift = 1 + _ASTRAY * np.maximum(gamma, 0.0)
     place_error = drift * by_places.own_error
     control = next_control(
-        rule, last.control, plan.length, float(place_error.max(initial=0.0)), cycle_error_alone,
+        rule, step.control, plan.length, float(place_error.max(initial=0.0)), cycle_error_alone,
         growth.cycles,
-        last.cycles, *_room(rule, stations_after, solves, rates, last.cycles + cycles), plan.sigma,
+        step.cycles, *_room(rule, stations_after, solves, rates, step.cycles + cycles), plan.sigma,
     )  # fmt: skip
     error_before = np.concatenate([np.zeros(0), *error.place])
     if error.newest_place:
@@ -669,7 +669,7 @@ def _corrected_points(
     place = drift * error_before + known_error + newest_error
     fastest_row = int(np.argmax(plan.arc))
     return Corrected(
-        last.cycles + cycles,
+        step.cycles + cycles,
         tuple(cracks),
         stations_after,
         solves,
@@ -683,7 +683,7 @@ def _corrected_points(
         ),
         control,
         stretch.zones,
-        last.zones,
+        step.zones,
     )
 
 
@@ -741,24 +741,24 @@ class _Spans:
     of_step_before: tuple[Stretch, ...] = ()
 
 
-def _spans(rule: GrowthRule, last: Step, curve: Stretch) -> _Spans:
-    solves, solves_then = curve.solves, solves_of(last)[1]
+def _spans(rule: GrowthRule, step: Step, curve: Stretch) -> _Spans:
+    solves, solves_then = curve.solves, solves_of(step)[1]
     if solves_then.n_solves == 1:
         return _Spans(curve, curve)
-    line = stretch_of(rule, solves.last(2), curve.start, curve.length, last.zones)
-    if solves_then.n_solves > 2 and last.zones is not None:
+    line = stretch_of(rule, solves.last_solves(2), curve.start, curve.length, step.zones)
+    if solves_then.n_solves > 2 and step.zones is not None:
         return _Spans(curve, line)
     begin, end = solves_then.sigma[-2:].tolist()
 
-    def stretch_before(each: SolveHistory) -> Stretch:
-        return stretch_of(rule, each, begin, end - begin, last.earlier_zones)
+    def stretch_before(history: SolveHistory) -> Stretch:
+        return stretch_of(rule, history, begin, end - begin, step.earlier_zones)
 
     then = stretch_before(solves_then)
     return _Spans(
         curve,
         line,
         (
-            then if solves_then.n_solves == 2 else stretch_before(solves_then.last(2)),
+            then if solves_then.n_solves == 2 else stretch_before(solves_then.last_solves(2)),
             then,
             stretch_before(solves),
         ),
@@ -786,7 +786,7 @@ class _PlacesError:
 
 
 def _places(
-    rule: GrowthRule, last: Step, solves: SolveHistory, spans: _Spans, frame: Floats, gap: Floats
+    rule: GrowthRule, step: Step, solves: SolveHistory, spans: _Spans, frame: Floats, gap: Floats
 ) -> _PlacesError:
     """Estimated errors of the tips by a corrected step; `solves` have its corrected directions.
 
@@ -796,11 +796,11 @@ def _places(
     and through those of now. For this step only one is known: its difference from a line is scaled
     as in the step before, and grows with the length.
     """
-    plan, old_solves = plan_of(last), solves_of(last)[1]
+    plan, old_solves = plan_of(step), solves_of(step)[1]
     direction = solves.direction[-1]
     size, arc = np.linalg.norm(gap, axis=1), np.abs((gap * direction).sum(axis=1))
     no_error = np.zeros(len(size))
-    if last.zones is not None:
+    if step.zones is not None:
         share = share_left(rule) * (_FIRST_OF_PLACE if old_solves.n_solves == 1 else 1.0)
         return _PlacesError(share * size, no_error, share * size, np.stack([share * arc, no_error]))
     by_gap, arc = _OF_GAP * size, _OF_GAP * arc
@@ -839,10 +839,10 @@ class _CyclesError:
 
 
 def _cycles(
-    rule: GrowthRule, last: Step, spans: _Spans, growth: Growth
+    rule: GrowthRule, step: Step, spans: _Spans, growth: Growth
 ) -> tuple[float, _CyclesError]:
     """Cycles of a corrected step, and their estimated error."""
-    plan, old_solves, share = plan_of(last), solves_of(last)[1], share_left(rule)
+    plan, old_solves, share = plan_of(step), solves_of(step)[1], share_left(rule)
     if old_solves.n_solves == 1:
         cycle_difference = abs(growth.cycles - plan.cycles)
         # The parabola of the next step mends it: of that, a square is left.
@@ -850,7 +850,7 @@ def _cycles(
         return growth.cycles, _CyclesError(rest, 0.0, _FIRST * share * cycle_difference)
     line_error = share * abs(growth.cycles - spans.line.arcs()[1])
     if old_solves.n_solves > 2:
-        return growth.cycles, _better_known(rule, last, spans, line_error)
+        return growth.cycles, _better_known(rule, step, spans, line_error)
     if old_solves.sigma[0] > 0:  # the step before has passed an interface
         return growth.cycles, _CyclesError(line_error, 0.0, line_error)
     # The second step: the parabola tells what the first one, along a line, was off.
@@ -861,14 +861,14 @@ def _cycles(
     )
 
 
-def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float) -> _CyclesError:
+def _better_known(rule: GrowthRule, step: Step, spans: _Spans, line_error: float) -> _CyclesError:
     """Errors of the cycles from the third step on.
 
     The error of the step before is the difference of the parabolas of that step and of this one; it
     replaces the estimate made then. The estimate of this step is reduced in the same ratio.
     """
-    old_solves, cycles_before = solves_of(last)[1], _error(last).newest_cycles
-    if last.zones is not None:
+    old_solves, cycles_before = solves_of(step)[1], _error(step).newest_cycles
+    if step.zones is not None:
         return _CyclesError(line_error, line_error + cycles_before, 0.0)
 
     share = share_left(rule)
@@ -877,7 +877,7 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
         share * abs(by_solves_then - by_last_two),
         abs(by_solves_then - by_solves_now),
     )
-    length_ratio = plan_of(last).length / float(old_solves.sigma[2] - old_solves.sigma[1])
+    length_ratio = plan_of(step).length / float(old_solves.sigma[2] - old_solves.sigma[1])
     newest_error = line_error * (
         float(np.clip(length_ratio * error_now / error_before, *_RATIOS))
         if error_before > 0
@@ -887,8 +887,8 @@ def _better_known(rule: GrowthRule, last: Step, spans: _Spans, line_error: float
         old_solves.sigma[0] == 0
     ):  # the first step of all is spanned by one parabola: the next is prolonged
         by_last_two, by_solves_then, by_solves_now = (
-            Stretch(each, 0.0, float(old_solves.sigma[1]), rule.threshold).arcs()[1]
-            for each in (old_solves.first(2), old_solves, spans.curve.solves)
+            Stretch(history, 0.0, float(old_solves.sigma[1]), rule.threshold).arcs()[1]
+            for history in (old_solves.first_solves(2), old_solves, spans.curve.solves)
         )
         prolonged_error, error_before = (
             _RATIO_OF_PROLONGED * abs(by_solves_then - by_solves_now),
@@ -905,36 +905,36 @@ def _rows_that_stay(ends: Floats, placed_cracks: Sequence[Crack]) -> Ints:
 
 
 def _without_lost_tips(
-    rule: GrowthRule, last: Step, rates: Rates, identities: Identities, rows_that_stay: Ints
+    rule: GrowthRule, step: Step, rates: Rates, identities: Identities, rows_that_stay: Ints
 ) -> Corrected:
     """Start anew after tips have left or met, since K of the other tips has jumped.
 
     Cycles up to the first exit are as predicted; from there the new rates count.
     """
-    plan, error = plan_of(last), _error(last)
-    stations_before = solves_of(last)[0]
+    plan, error = plan_of(step), _error(step)
+    stations_before = solves_of(step)[0]
     x = (stations_before.x + plan.move)[rows_that_stay]
     stations = _stations(
         rates.cracks, identities, x, (stations_before.fresh | plan.moves)[rows_that_stay]
     )
     solves = first_solves(rule, rates)
-    last_solves = solves_of(last)[1].last(2)
-    stretch_ahead = stretch_of(rule, last_solves, plan.sigma, plan.length, last.zones)
+    last_solves = solves_of(step)[1].last_solves(2)
+    stretch_ahead = stretch_of(rule, last_solves, plan.sigma, plan.length, step.zones)
     zones = stretch_ahead.zones if stretch_ahead.integration is not None else None
     zones = None if zones is None else zones.at(rows_that_stay)
     lost_rows = np.setdiff1d(np.arange(len(plan.arc)), rows_that_stay)
-    exit_ = _exit(rule, last, stretch_ahead, lost_rows)
+    exit_ = _exit(rule, step, stretch_ahead, lost_rows)
     rest = plan.length - exit_
     cycles = stretch_ahead.arcs(exit_)[1] if rest > 0 else plan.cycles
-    if 0 < rates.largest < np.inf and last.zones is None:
-        cycles += rest / rates.largest
+    if 0 < rates.largest_rate < np.inf and step.zones is None:
+        cycles += rest / rates.largest_rate
     elif rest > 0:
         cycles = plan.cycles
     place_error = np.concatenate(error.place)[rows_that_stay]
     cycle_error = share_left(rule) * abs(cycles - plan.cycles) + plan.error
     cycle_error += solves.exponent * error.behind * cycles
     return Corrected(
-        last.cycles + cycles,
+        step.cycles + cycles,
         rates.cracks,
         stations,
         solves,
@@ -944,10 +944,10 @@ def _without_lost_tips(
     )
 
 
-def _exit(rule: GrowthRule, last: Step, stretch_ahead: Stretch, lost_rows: Ints) -> float:
+def _exit(rule: GrowthRule, step: Step, stretch_ahead: Stretch, lost_rows: Ints) -> float:
     """Step of σ until the first of the lost tips leaves the body; all of it where none does."""
-    plan, mesh = plan_of(last), rule.problem.mesh
-    stations = solves_of(last)[0]
+    plan, mesh = plan_of(step), rule.problem.mesh
+    stations = solves_of(step)[0]
     if _is_inside(mesh, (stations.x + plan.move)[lost_rows]):
         return plan.length
 
@@ -963,24 +963,24 @@ def _is_inside(mesh: Mesh, x: Floats) -> bool:
     return bool(contains(mesh, x).all())
 
 
-def _last_step_of_run(last: Step, rates: Rates, identities: Identities) -> Corrected:
+def _last_step_of_run(step: Step, rates: Rates, identities: Identities) -> Corrected:
     """The last step of a run, at whose end a rate is infinite: no polynomial leads there.
 
     The inverse of the largest rate is taken to fall to zero along the step, as `cycles_between`
     does it.
     """
-    plan, error = plan_of(last), _error(last)
-    stations, old_solves = solves_of(last)
+    plan, error = plan_of(step), _error(step)
+    stations, old_solves = solves_of(step)
     cycles = 0.5 * plan.length / float(old_solves.rate[-1].max())
-    if last.zones is not None:
+    if step.zones is not None:
         cycles = 0.5 * plan.cycles
     stations_after = _stations(
         rates.cracks, identities, stations.x + plan.move, stations.fresh | plan.moves
     )
     solves = replace(old_solves, rate=np.vstack([old_solves.rate[:-1], rates.law_rate]))
     return Corrected(
-        last.cycles + cycles, rates.cracks, stations_after, solves,
-        StepError(error.place, error.cycles + cycles), StepControl(), last.zones,
+        step.cycles + cycles, rates.cracks, stations_after, solves,
+        StepError(error.place, error.cycles + cycles), StepControl(), step.zones,
     )  # fmt: skip
 
 
@@ -989,7 +989,7 @@ def cycles_until(rule: GrowthRule, step: Step, part: float, end_rate: float | No
     del end_rate  # behind the first exit other rates count
     plan, solves = plan_of(step), solves_of(step)[1]
     length = part * plan.length
-    return stretch_of(rule, solves.last(2), plan.sigma, length, step.zones).arcs()[1]
+    return stretch_of(rule, solves.last_solves(2), plan.sigma, length, step.zones).arcs()[1]
 
 
 __all__ = [

@@ -72,8 +72,8 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
     moved_rates = _rates_of_moved_K(rule, rates, bar)
     for mode, rates_of_mode in enumerate(moved_rates):
         change, angle_change = np.zeros(n), np.zeros(n)
-        for other_angle, other in rates_of_mode:
-            change = np.maximum(change, _log_ratio(rate, other))
+        for other_angle, other_rate in rates_of_mode:
+            change = np.maximum(change, _log_ratio(rate, other_rate))
             angle_change = np.maximum(angle_change, np.abs(other_angle - angle))
         share = np.concatenate([_share(o[..., mode], b[..., mode]) for o, b in zip(parts, bar)])
         total, contact, turn = total + change, contact + share * change, turn + angle_change
@@ -134,7 +134,7 @@ def _with_foretold_bars(old_sif: SIF, new_sif: SIF) -> SIF | None:
 
 def add_K_error(
     rule: GrowthRule,
-    last: Step | None,
+    step: Step | None,
     corrected_step: Corrected,
     rates: Rates,
     sif: Answers,
@@ -143,25 +143,25 @@ def add_K_error(
     """A settled step whose error also has what the bars of K have cost so far."""
     if corrected_step.error is None:
         return corrected_step
-    if is_foretold and last is not None and last.error is not None:  # in proportion to the bars
-        old_error = last.error
+    if is_foretold and step is not None and step.error is not None:  # in proportion to the bars
+        old_error = step.error
         rate_error_now = RateError(
             _WIDER * old_error.rate, _WIDER * old_error.rate_contact, _WIDER * old_error.turn
         )
     else:
         rate_error_now = rate_error(rule, rates, sif)
-    if last is None or last.error is None:
+    if step is None or step.error is None:
         error = replace(
             corrected_step.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0
         )
     else:
-        error_before, cycles = last.error, corrected_step.cycles - last.cycles
+        error_before, cycles = step.error, corrected_step.cycles - step.cycles
         errors_of_K, parts = (
             [error_before.rate, rate_error_now.rate],
             [error_before.rate_contact, rate_error_now.contact],
         )
         turns = [turn for turn in (error_before.turn, rate_error_now.turn) if np.isfinite(turn)]
-        way = max((float(da.max(initial=0.0)) for da in last.da), default=0.0)
+        way = max((float(da.max(initial=0.0)) for da in step.da), default=0.0)
         # Of 2D tips it is known how errors of before have grown.
         drift = corrected_step.error.K_place
         K_place, share = (error_before.K_place, _ASTRAY) if np.isnan(drift) else (drift, 1.0)
@@ -186,28 +186,28 @@ def add_K_error(
     )
 
 
-def shortfall(rule: GrowthRule, last: Step) -> str:
+def shortfall(rule: GrowthRule, step: Step) -> str:
     """Why a tolerance is not met at a step, and what to do; empty where it is met."""
-    error = last.error
+    error = step.error
     if error is None or rule.tolerance is None or not error.grown > 0:
         return ""
-    life = error.life / last.cycles if last.cycles > 0 else 0.0
+    life = error.life / step.cycles if step.cycles > 0 else 0.0
     path = error.path / error.grown
     if max(life, path) <= rule.tolerance:
         return ""
     steps = error.path - error.K_place
     shares = {
-        "steps": max(error.cycles / max(last.cycles, 1e-300), steps / error.grown),
-        "K": max(error.K / max(last.cycles, 1e-300), error.K_place / error.grown),
-        "contact": error.contact / max(last.cycles, 1e-300),
-        "no bar": error.unknown / max(last.cycles, 1e-300),
+        "steps": max(error.cycles / max(step.cycles, 1e-300), steps / error.grown),
+        "K": max(error.K / max(step.cycles, 1e-300), error.K_place / error.grown),
+        "contact": error.contact / max(step.cycles, 1e-300),
+        "no bar": error.unknown / max(step.cycles, 1e-300),
     }
     worst_name = max(shares, key=lambda name: shares[name])
     parts = ", ".join(f"{name} {share:.1e}" for name, share in shares.items() if share > 0)
-    reasons = dict.fromkeys(r for state in last.sif for sif in state for r in sif.reasons if r)
+    reasons = dict.fromkeys(r for state in step.sif for sif in state for r in sif.reasons if r)
     reasons_in_words = f" ({'; '.join(reasons)})" if reasons and worst_name == "no bar" else ""
     return (
-        f"tolerance = {rule.tolerance:g} is not met at step {last.index}: the life is known to "
+        f"tolerance = {rule.tolerance:g} is not met at step {step.index}: the life is known to "
         f"{life:.1e}, the path to {path:.1e} of the length grown, by {parts}. "
         f"{_REMEDY[worst_name]}{reasons_in_words}"
     )
@@ -230,14 +230,16 @@ def _rates_of_moved_K(
     inputs = criterion_inputs(rule, rates.problem, rates.response)
     angles, other_angles = [], []
     with collected_warnings([]):  # they are of cracks that nobody has
-        for c, one in enumerate(inputs):
-            every = [
-                _moved_K(one.K, bar[c], mode, sign) for mode in range(n_modes) for sign in _SIGNS
+        for c, crack_input in enumerate(inputs):
+            all_K = [
+                _moved_K(crack_input.K, bar[c], mode, sign)
+                for mode in range(n_modes)
+                for sign in _SIGNS
             ]
-            each = one.rates_of_K(np.concatenate(every, axis=1))
-            shape = (n_modes, len(_SIGNS), one.K.shape[1])
-            angles.append(each.angle.reshape(shape))
-            other_angles.append(each.rate.reshape(shape))
+            cycle_rates = crack_input.rates_of_K(np.concatenate(all_K, axis=1))
+            shape = (n_modes, len(_SIGNS), crack_input.K.shape[1])
+            angles.append(cycle_rates.angle.reshape(shape))
+            other_angles.append(cycle_rates.rate.reshape(shape))
     angle, rate = np.concatenate(angles, axis=2), np.concatenate(other_angles, axis=2)
     return [
         list(zip(*angles_and_rates, strict=True))
@@ -264,8 +266,8 @@ def _moved_rates(
         free_response = replace(rates.free_response, sif=moved_by_bars(rates.free_response.sif))
     with collected_warnings([]):  # they are of cracks that nobody has
         response = replace(rates.response, sif=moved_by_bars(rates.sif))
-        other = rates_of(rule, rates.problem, response, free_response)
-    return other.angle, other.law_rate
+        new_rates = rates_of(rule, rates.problem, response, free_response)
+    return new_rates.angle, new_rates.law_rate
 
 
 def _with_K(sif: SIF, bar: Floats, mode: int, sign: float) -> SIF:
@@ -282,12 +284,12 @@ def _moved_K(K_of_solution: Floats, bar: Floats, mode: int, sign: float) -> Floa
     return K
 
 
-def _log_ratio(rate: Floats, other: Floats) -> Floats:
+def _log_ratio(rate: Floats, other_rate: Floats) -> Floats:
     """|ln| of the ratio of two rates; at most a whole where one of them is zero or infinite."""
-    is_valid = (rate > 0) & np.isfinite(rate) & (other > 0) & np.isfinite(other)
-    ratio = np.where(is_valid, other, 1.0) / np.where(is_valid, rate, 1.0)
+    is_valid = (rate > 0) & np.isfinite(rate) & (other_rate > 0) & np.isfinite(other_rate)
+    ratio = np.where(is_valid, other_rate, 1.0) / np.where(is_valid, rate, 1.0)
     return np.asarray(
-        np.where(is_valid, np.abs(np.log(ratio)), np.where(rate == other, 0.0, _WHOLE))
+        np.where(is_valid, np.abs(np.log(ratio)), np.where(rate == other_rate, 0.0, _WHOLE))
     )
 
 

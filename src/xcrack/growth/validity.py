@@ -179,7 +179,7 @@ def validity(
         K = clipped_K(np.stack([row[c].K for row in sif])) if sif else np.zeros((0, 0, 2))
         if not K.size:
             continue
-        largest, angle = _largest_K_eq(K, nu)
+        largest_K, angle = _largest_K_eq(K, nu)
         places_of_crack = sif[0][c]
         directions = _directions(places_of_crack, angle)
         size = _size(crack, mesh)
@@ -187,12 +187,12 @@ def validity(
         is_inside = is_inside if is_inside.any() else np.ones(len(is_inside), dtype=bool)
         for j in np.nonzero(is_inside)[0].tolist():
             place = f"crack {c}, {coordinates(places_of_crack.x[j])}"
-            judge("K", float(largest[j]), place)
+            judge("K", float(largest_K[j]), place)
             if K_c is not None:
-                judge("of_toughness", float(largest[j]) / K_c, place)
+                judge("of_toughness", float(largest_K[j]) / K_c, place)
             if yield_stress is None:
                 continue
-            square = (float(largest[j]) / yield_stress) ** 2
+            square = (float(largest_K[j]) / yield_stress) ** 2
             state = material.constraint(thickness, square)
             zone = _RADIUS[state] * square
             judge("zone", zone, place)
