@@ -192,8 +192,8 @@ class Deck:
         return Problem(self.mesh, cracks=cracks, **arguments)
 
     def __str__(self) -> str:
-        names = ", ".join(each.name for each in self.supports) or "none"
-        loads = ", ".join(each.name for each in self.loads) or "none"
+        names = ", ".join(support.name for support in self.supports) or "none"
+        loads = ", ".join(load.name for load in self.loads) or "none"
         step = f"{self.step!r} of {len(self.steps)}" if self.steps else "none"
         rows = [
             ("deck", str(self.path)),
@@ -267,15 +267,15 @@ def read_deck(
             return _mesh_deck(path)
         model = read_model(path)
     steps = steps_of(model)
-    chosen = chosen_step(steps, step, path.name)
-    state = DeckState(model, steps, chosen, time, left_out)
+    step_of_loads = chosen_step(steps, step, path.name)
+    state = DeckState(model, steps, step_of_loads, time, left_out)
     _refuse_others(state, left_out)
     loads = list(state.spread.values())
     parts = {f"stress {n}": elements for n, (elements, _) in enumerate(state.stresses)}
-    for n, one in enumerate(loads):
-        if one.faces[0].min(initial=0) < 0:
-            parts[f"load {n}"] = np.concatenate(one.elements)
-    body = DeckBody(model, [one for n, one in enumerate(loads) if f"load {n}" not in parts], parts)
+    for n, load in enumerate(loads):
+        if load.faces[0].min(initial=0) < 0:
+            parts[f"load {n}"] = np.concatenate(load.elements)
+    body = DeckBody(model, [s for n, s in enumerate(loads) if f"load {n}" not in parts], parts)
     scene = _Scene(body, state)
     material = body.material(state.temperature, state.initial_temperature)
     supports, deck_loads = scene.supports(), scene.loads()
@@ -287,11 +287,11 @@ def read_deck(
         material=material,
         supports=tuple(supports),
         loads=tuple(deck_loads),
-        step="" if chosen is None else chosen.name,
-        steps=tuple(each.name for each in steps),
+        step="" if step_of_loads is None else step_of_loads.name,
+        steps=tuple(deck_step.name for deck_step in steps),
         amplitudes=MappingProxyType({
-            one.keyword.option("NAME"): frozen_copy(one.table)
-            for one in state.amplitudes.values() if len(one.table)
+            amplitude.keyword.option("NAME"): frozen_copy(amplitude.table)
+            for amplitude in state.amplitudes.values() if len(amplitude.table)
         }),
         points=MappingProxyType({
             name: lock(body.places[body.nodes(rows[body.is_inside(rows)])])
@@ -356,36 +356,36 @@ class _Scene:
     def supports(self) -> list[Support]:
         """On facet sets where nodes are whole facets, on points where they are not."""
         result: list[Support] = []
-        for n, one in enumerate(self.state.restraints):
-            every = np.unique(np.concatenate(one.rows))
+        for n, restraint in enumerate(self.state.restraints):
+            all_rows = np.unique(np.concatenate(restraint.rows))
             equal_supports: dict[tuple[bytes, bytes], tuple[Ints, Floats, list[int]]] = {}
-            for axis in one.axes:
-                rows = every[self.state.owner[axis, every] == n]
-                self._check_reference(rows[~self.body.is_inside(rows)], one.place)
+            for axis in restraint.axes:
+                rows = all_rows[self.state.owner[axis, all_rows] == n]
+                self._check_reference(rows[~self.body.is_inside(rows)], restraint.place)
                 rows = rows[self.body.is_inside(rows)]
                 values = self.state.value[axis, rows]
                 if len(rows) and axis < self.body.dim:
                     key = rows.tobytes(), values.tobytes()
                     equal_supports.setdefault(key, (rows, values, []))[2].append(axis)
             for rows, values, axes in equal_supports.values():
-                result += self._supports_of(rows, values, axes, one.name)
+                result += self._supports_of(rows, values, axes, restraint.name)
         return result + self._coupled_supports()
 
     def _supports_of(self, rows: Ints, values: Floats, axes: list[int], name: str) -> list[Support]:
         body = self.body
         numbers = body.nodes(rows)
         result: list[Support] = []
-        for where in self._set_and_points(numbers, name):
+        for place in self._set_and_points(numbers, name):
             if not values.any():
                 result += (
-                    [fix(where, axis) for axis in axes] if len(axes) < body.dim else [fix(where)]
+                    [fix(place, axis) for axis in axes] if len(axes) < body.dim else [fix(place)]
                 )
                 continue
             value: Any = float(values[0])
             if (values != values[0]).any():
                 value = body.node_field(numbers, values, "displacement")
             vector: Any = tuple(value if axis in axes else None for axis in range(body.dim))
-            result.append(displacement(where, vector))
+            result.append(displacement(place, vector))
         return result
 
     def _set_and_points(self, numbers: Ints, name: str) -> list[Any]:
@@ -455,8 +455,8 @@ class _Scene:
     def loads(self) -> list[Load]:
         """Forces, pressures, forces per volume, temperature and initial stress."""
         result = self._forces()
-        for n, one in enumerate(self.state.spread.values()):
-            result += self._spread_load(one, n)
+        for n, load in enumerate(self.state.spread.values()):
+            result += self._spread_load(load, n)
         if (change := self._temperature()) is not None:
             result.append(change)
         if self.state.stresses:
@@ -505,67 +505,67 @@ class _Scene:
             moment if np.any(moment) else None, about=body.model.points[node, : body.dim],
         )  # fmt: skip
 
-    def _spread_load(self, one: SpreadLoad, n: int) -> list[Load]:
-        body, value, numbers = self.body, one.values[0], one.numbers
-        if not any(one.values):
+    def _spread_load(self, load: SpreadLoad, n: int) -> list[Load]:
+        body, value, numbers = self.body, load.values[0], load.numbers
+        if not any(load.values):
             return []
-        if one.faces[0].min(initial=0) < 0:
-            force = self._volume_force(one, body.cells(f"load {n}"))
+        if load.faces[0].min(initial=0) < 0:
+            force = self._volume_force(load, body.cells(f"load {n}"))
             return [] if force is None else [body_force(force)]
-        where = body.facet_name(one)
-        facets = body.mesh.facet_sets.get(where, np.zeros((0, body.dim), np.int64))
+        name = body.facet_name(load)
+        facets = body.mesh.facet_sets.get(name, np.zeros((0, body.dim), np.int64))
         owners = body.mesh.facet_to_cell[body.mesh.facet_numbers(facets)]
         if not len(facets) or (owners[:, 1] >= 0).any():
-            one.refuse(
-                f"{one.label} acts on {'faces inside the body' if len(facets) else 'no face'}: "
+            load.refuse(
+                f"{load.label} acts on {'faces inside the body' if len(facets) else 'no face'}: "
                 "give faces of its boundary."
             )
-        if one.label == "P" and len(set(one.values)) > 1:  # face by face
+        if load.label == "P" and len(set(load.values)) > 1:  # face by face
             pressures = np.zeros(len(body.mesh.cells))
-            for elements, faces, p in zip(one.elements, one.faces, one.values, strict=True):
+            for elements, faces, p in zip(load.elements, load.faces, load.values, strict=True):
                 for kind, rows in body.model.facets_of(elements, faces):
                     pressures[body.cells_beside(kind, rows)] = p
-            return [pressure(where, body.cell_field(pressures, "pressure"))]
-        if one.label == "P":
-            return [pressure(where, value)]
-        if one.label == "HP" and len(numbers) > 1 and numbers[0] != numbers[1]:
-            return [pressure(where, _Hydrostatic(value, *numbers[:2]))]
+            return [pressure(name, body.cell_field(pressures, "pressure"))]
+        if load.label == "P":
+            return [pressure(name, value)]
+        if load.label == "HP" and len(numbers) > 1 and numbers[0] != numbers[1]:
+            return [pressure(name, _Hydrostatic(value, *numbers[:2]))]
         direction = np.array(numbers[: body.dim])
-        if one.label == "TRVEC" and len(direction) == body.dim and direction.any():
-            return [traction(where, value * direction / np.linalg.norm(direction))]
-        one.refuse(f"there is no load {one.label}: give P, HP or TRVEC on faces.")
+        if load.label == "TRVEC" and len(direction) == body.dim and direction.any():
+            return [traction(name, value * direction / np.linalg.norm(direction))]
+        load.refuse(f"there is no load {load.label}: give P, HP or TRVEC on faces.")
         return []
 
-    def _volume_force(self, one: SpreadLoad, members: Ints) -> Any:
+    def _volume_force(self, load: SpreadLoad, members: Ints) -> Any:
         """Force per volume as a vector, or a function of the place."""
-        body, numbers, value = self.body, (*one.numbers, 0.0, 0.0, 0.0), one.values[0]
+        body, numbers, value = self.body, (*load.numbers, 0.0, 0.0, 0.0), load.values[0]
         factor = np.ones(len(members))
-        if one.label in ("BX", "BY", "BZ"):
-            vector = value * np.eye(3)["XYZ".index(one.label[1])]
-        elif one.label in ("GRAV", "CENTRIF", "CENT") and len(one.numbers) >= body.dim:
+        if load.label in ("BX", "BY", "BZ"):
+            vector = value * np.eye(3)["XYZ".index(load.label[1])]
+        elif load.label in ("GRAV", "CENTRIF", "CENT") and len(load.numbers) >= body.dim:
             factor = body.density[members]
             vector = np.array(numbers[:3])
             vector = value * vector / (np.linalg.norm(vector) or 1.0)
         else:
-            one.refuse(
-                f"there is no load {one.label}: give GRAV, CENTRIF, BX, BY or BZ on elements, P, "
+            load.refuse(
+                f"there is no load {load.label}: give GRAV, CENTRIF, BX, BY or BZ on elements, P, "
                 "HP or TRVEC on faces."
             )
         if np.isnan(factor).any():
-            one.refuse(f"{one.label} needs the *DENSITY of each material.")
-        if one.label.startswith("CENT"):
+            load.refuse(f"{load.label} needs the *DENSITY of each material.")
+        if load.label.startswith("CENT"):
             density = np.zeros(len(body.mesh.cells))
             density[members] = factor
-            axis = np.array(one.numbers[3:6])
+            axis = np.array(load.numbers[3:6])
             if len(axis) < 3 or not axis.any():
-                one.refuse("give omega², a point of the axis and its direction.")
+                load.refuse("give omega², a point of the axis and its direction.")
             axis = axis / np.linalg.norm(axis)
             return _Rotation(
-                body.cell_field(density, "density"), value, one.numbers[:3], tuple(axis.tolist())
+                body.cell_field(density, "density"), value, load.numbers[:3], tuple(axis.tolist())
             )
         values = np.zeros((len(body.mesh.cells), body.dim))
         values[members] = factor[:, None] * vector[: body.dim]
-        return body.cell_field(values, one.label)
+        return body.cell_field(values, load.label)
 
     def _temperature(self) -> Load | None:
         """The thermal strain as that of one coefficient of expansion."""
@@ -579,10 +579,10 @@ class _Scene:
             change = state.temperature - state.initial_temperature
             return temperature(body.point_field(change, "temperature"))
         for key in expanding_sections:
-            one = body.materials[key]
-            alpha = float(one.expansion[0, 0])
+            material = body.materials[key]
+            alpha = float(material.expansion[0, 0])
             rows = body.nodes_of_material(key)
-            strain[rows] = one.strain(state.temperature[rows], state.initial_temperature[rows])
+            strain[rows] = material.strain(state.temperature[rows], state.initial_temperature[rows])
         if not alpha:
             warn(
                 f"{body.model.path.name}: the temperature changes, but no material has an "

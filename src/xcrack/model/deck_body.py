@@ -85,14 +85,14 @@ class DeckMaterial:
         if not callable(alpha) and not (len(self.elastic_rows) > 1 and is_variable):
             E_of_body, nu_of_body = (float(np.interp(T[0], at, v)) for v in (E, nu))
             return Isotropic(E_of_body, nu_of_body, plane, self.yield_stress, alpha=alpha)
-        low, high = np.interp([T.min(), T.max()], at, nu)
-        if abs(high - low) > _EQUAL:
+        nu_0, nu_1 = np.interp([T.min(), T.max()], at, nu)
+        if abs(nu_1 - nu_0) > _EQUAL:
             warn(
-                f"{self.place}: Poisson's ratio of *MATERIAL {self.name!r} goes from {low:g} to "
-                f"{high:g} with the temperature of the body: it is taken as {(low + high) / 2:g}."
+                f"{self.place}: Poisson's ratio of *MATERIAL {self.name!r} goes from {nu_0:g} to "
+                f"{nu_1:g} with the temperature of the body: it is taken as {(nu_0 + nu_1) / 2:g}."
             )
         modulus = OfTemperature(field, tuple(at.tolist()), tuple(E.tolist()))
-        return Graded(modulus, float((low + high) / 2), plane, self.yield_stress, alpha=alpha)
+        return Graded(modulus, float((nu_0 + nu_1) / 2), plane, self.yield_stress, alpha=alpha)
 
 
 @dataclass(frozen=True)
@@ -163,9 +163,9 @@ class DeckBody:
         self.materials = _materials(model)
         self.sections = self._sections()
         facets = [
-            (kind, self.facet_name(one), rows)
-            for one in loads
-            for elements, faces in zip(one.elements, one.faces, strict=True)
+            (kind, self.facet_name(load), rows)
+            for load in loads
+            for elements, faces in zip(load.elements, load.faces, strict=True)
             for kind, rows in model.facets_of(elements, faces)
         ]
         parts = {**parts, **{f"material {key}": rows for key, rows in self.sections.items()}}
@@ -193,7 +193,7 @@ class DeckBody:
 
     def _sections(self) -> dict[str, Ints]:
         groups = self.model.body_groups
-        every = np.concatenate([group.first + np.arange(len(group.nodes)) for group in groups])
+        all_rows = np.concatenate([group.first + np.arange(len(group.nodes)) for group in groups])
         members: dict[str, list[Ints]] = {}
         thicknesses: set[float] = set()
         for line in self.model.lines:
@@ -204,12 +204,12 @@ class DeckBody:
                 keyword.refuse("composite sections are not modelled.", error=ProblemError)
             name = keyword.option("MATERIAL")
             if name.casefold() not in self.materials:
-                names = ", ".join(one.name for one in self.materials.values()) or "none"
+                names = ", ".join(m.name for m in self.materials.values()) or "none"
                 keyword.refuse(
                     f"the deck has no *MATERIAL {name!r}; it has {names}.", error=ProblemError
                 )
             elements = self.model.elements_of(keyword.option("ELSET"), line)
-            members.setdefault(name.casefold(), []).append(np.intersect1d(elements, every))
+            members.setdefault(name.casefold(), []).append(np.intersect1d(elements, all_rows))
             if self.dim == 2:
                 row = next((keyword.number(r[0], k, "", 1.0) for k, r in keyword.rows), 1.0)
                 thicknesses.add(row or 1.0)
@@ -222,14 +222,14 @@ class DeckBody:
         self.thickness = thicknesses.pop() if thicknesses else 1.0
         sections = {name: np.unique(np.concatenate(rows)) for name, rows in members.items()}
         sections = {name: rows for name, rows in sections.items() if len(rows)}
-        n_missing = len(np.setdiff1d(every, np.concatenate([every[:0], *sections.values()])))
+        n_missing = len(np.setdiff1d(all_rows, np.concatenate([all_rows[:0], *sections.values()])))
         if sections and n_missing:
             raise ProblemError(
-                f"{self.model.path.name}: {n_missing} of {len(every)} elements have no *SOLID "
+                f"{self.model.path.name}: {n_missing} of {len(all_rows)} elements have no *SOLID "
                 "SECTION: give them a material."
             )
         if not sections and len(self.materials) == 1:
-            return {name: every for name in self.materials}
+            return {name: all_rows for name in self.materials}
         return sections
 
     def material(self, T: Floats, T_0: Floats) -> Material | dict[str, Material] | None:
@@ -240,13 +240,13 @@ class DeckBody:
         field = self.function_of(T, "temperature")
         by_name: dict[str, Material] = {}
         for key in self.sections:
-            one, rows = self.materials[key], self.nodes_of_material(key)
+            m, rows = self.materials[key], self.nodes_of_material(key)
             alpha: Any = None
             if len(self.sections) > 1 and not np.array_equal(T, T_0):
-                alpha = one.expansion[0, 0] if len(one.expansion) else 0.0
-                if len(one.expansion) > 1:
-                    alpha = MeanExpansion(field, self.function_of(T_0, "temperature"), one)
-            by_name[one.name] = one.elastic_at(self.plane, T[rows], field, alpha)
+                alpha = m.expansion[0, 0] if len(m.expansion) else 0.0
+                if len(m.expansion) > 1:
+                    alpha = MeanExpansion(field, self.function_of(T_0, "temperature"), m)
+            by_name[m.name] = m.elastic_at(self.plane, T[rows], field, alpha)
         return by_name if len(set(by_name.values())) > 1 else next(iter(by_name.values()), None)
 
     def function_of(self, values: Floats, name: str) -> Any:
@@ -284,8 +284,8 @@ class DeckBody:
         """Cells behind faces of elements, given by the nodes of their corners."""
         choices: dict[str, list[tuple[int, ...]]] = {"line": [(0, 1)], "triangle": [(0, 1, 2)]}
         quad: list[tuple[int, ...]] = [(0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3)]  # two are facets
-        chosen = np.concatenate([corners[:, c] for c in choices.get(kind, quad)])
-        facet = numbers_of(self.mesh, self._number[chosen])
+        vertices = np.concatenate([corners[:, c] for c in choices.get(kind, quad)])
+        facet = numbers_of(self.mesh, self._number[vertices])
         return np.asarray(self.mesh.facet_to_cell[facet[facet >= 0], 0])
 
     def is_inside(self, rows: Ints) -> Any:
@@ -338,17 +338,17 @@ class DeckBody:
     def node_field(self, numbers: Ints, values: Floats, name: str) -> Field:
         """Field of the second order with values at some mesh points and middles of edges."""
         mesh = sound_mesh(self.mesh.points, self.mesh.cells)
-        every = np.zeros(len(self.places))
-        every[numbers] = values
-        ends = every[mesh.edges].mean(axis=1)
-        every[mesh.n_points :] = np.where(
-            self.is_bare[mesh.n_points :], ends, every[mesh.n_points :]
+        at_nodes = np.zeros(len(self.places))
+        at_nodes[numbers] = values
+        ends = at_nodes[mesh.edges].mean(axis=1)
+        at_nodes[mesh.n_points :] = np.where(
+            self.is_bare[mesh.n_points :], ends, at_nodes[mesh.n_points :]
         )
         pairs = _EDGES[_EDGES.max(axis=1) <= self.dim]
         corners = mesh.cells[:, pairs].reshape(-1, 2)
         middles = self._edge_numbers(corners).reshape(len(mesh.cells), -1)
         nodes = np.concatenate([mesh.cells, middles], axis=1)
-        return Field(mesh, lock(nodes), lock(every), f"{name} of {self.model.path.name}")
+        return Field(mesh, lock(nodes), lock(at_nodes), f"{name} of {self.model.path.name}")
 
     def point_field(self, values: Floats, name: str) -> Any:
         """The value of the nodes where it is one, else a linear field.

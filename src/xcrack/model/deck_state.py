@@ -64,7 +64,7 @@ def steps_of(model: AbaqusModel) -> tuple[DeckStep, ...]:
     for line in model.lines_of("STEP"):
         n = len(steps) + 1
         names = ("STATIC", *_OTHER_PROCEDURES)
-        keywords = (each.keyword for each in model.lines if each.step == n)
+        keywords = (deck_line.keyword for deck_line in model.lines if deck_line.step == n)
         procedure = next((keyword for keyword in keywords if keyword.name in names), None)
         is_static = procedure is None or procedure.name == "STATIC"
         period = 1.0
@@ -89,12 +89,12 @@ def chosen_step(steps: Sequence[DeckStep], step: object, source: str) -> DeckSte
         There is no such step, or it is no static one.
     """
     choice = steps[-1] if steps and step is None else None
-    for each in steps:
-        is_number = isinstance(step, int) and not isinstance(step, bool) and step == each.number
-        if is_number or (isinstance(step, str) and step.casefold() == each.name.casefold()):
-            choice = each
+    for s in steps:
+        is_number = isinstance(step, int) and not isinstance(step, bool) and step == s.number
+        if is_number or (isinstance(step, str) and step.casefold() == s.name.casefold()):
+            choice = s
     if choice is None and step is not None:
-        names = ", ".join(f"{each.number} ({each.name})" for each in steps)
+        names = ", ".join(f"{s.number} ({s.name})" for s in steps)
         remedy = f"give the number or name of one of {names}" if steps else "leave it out"
         raise ProblemError(
             f"read_deck: step = {value_text(step)}: {source} has no such step: {remedy}."
@@ -352,7 +352,7 @@ class DeckState:
             keyword.refuse("velocities and accelerations are no statics.", error=ProblemError)
         step = line.step or 0
         if keyword.options.get("OP", "").upper() == "NEW":
-            current_numbers = [n for n, one in enumerate(self.restraints) if one.step == step]
+            current_numbers = [n for n, r in enumerate(self.restraints) if r.step == step]
             self.owner[~np.isin(self.owner, current_numbers)] = -1
         is_base = self.step is not None and self.step.is_perturbation and step != self.step.number
         factor = 0.0 if is_base else self._factor(line)
@@ -388,10 +388,8 @@ class DeckState:
         owner = self.owner[axis, rows]
         has_owner = owner >= 0
         has_owner[has_owner] = [self.restraints[n].step == step for n in owner[has_owner].tolist()]
-        other = self.value[axis, rows[has_owner]]
-        if (
-            np.abs(other - value) > 1e-9 * max(abs(value), float(np.abs(other).max(initial=0)))
-        ).any():
+        v = self.value[axis, rows[has_owner]]
+        if (np.abs(v - value) > 1e-9 * max(abs(value), float(np.abs(v).max(initial=0)))).any():
             first = self.restraints[int(owner[has_owner][0])].place
             keyword.refuse(
                 f"direction {axis + 1} of {name} is given {value:g} here and another value in "
@@ -424,9 +422,9 @@ class DeckState:
         keyword, step = line.keyword, line.step or 0
         if keyword.options.get("OP", "").upper() == "NEW":
             self.spread = {
-                key: one
-                for key, one in self.spread.items()
-                if one.step == step or one.line.keyword.name != keyword.name
+                key: load
+                for key, load in self.spread.items()
+                if load.step == step or load.line.keyword.name != keyword.name
             }
         factor = self._factor(line)
         for number, row in keyword.rows:
@@ -443,15 +441,15 @@ class DeckState:
             target = "" if by_number else row[0]
             what = keyword.place if by_number else target.casefold()
             key = (keyword.name, what, row[1].upper(), str(numbers) if by_number else "")
-            one = self.spread.get(key)
-            if one is None or one.step != step:
-                one = SpreadLoad(label, target, [], [], [], numbers, step, line, number)
-                self.spread[key] = one
+            load = self.spread.get(key)
+            if load is None or load.step != step:
+                load = SpreadLoad(label, target, [], [], [], numbers, step, line, number)
+                self.spread[key] = load
             elif not by_number:
-                one.refuse(f"{row[0]} has the load {label} twice in one step: give one value.")
-            one.elements.append(elements)
-            one.faces.append(faces)
-            one.values.append(value)
+                load.refuse(f"{row[0]} has the load {label} twice in one step: give one value.")
+            load.elements.append(elements)
+            load.faces.append(faces)
+            load.values.append(value)
 
     def _loaded_faces(
         self, line: DeckLine, number: int, name: str, label: str
@@ -516,14 +514,14 @@ def _axes(keyword: Keyword, row: list[str], number: int) -> tuple[int, ...]:
     word = row[1].upper() if len(row) > 1 else ""
     if word in _HELD:
         return tuple(_HELD[word])
-    first = keyword.whole_number(word, number, "a direction, or a word such as ENCASTRE")
-    last = keyword.whole_number(row[2], number, "a direction") if len(row) > 2 and row[2] else first
-    if not 1 <= first <= last <= 6:
+    start = keyword.whole_number(word, number, "a direction, or a word such as ENCASTRE")
+    end = keyword.whole_number(row[2], number, "a direction") if len(row) > 2 and row[2] else start
+    if not 1 <= start <= end <= 6:
         keyword.refuse(
-            f"directions {first} to {last}: 1 to 3 are displacements, 4 to 6 turns; others are no "
+            f"directions {start} to {end}: 1 to 3 are displacements, 4 to 6 turns; others are no "
             "statics.", number, ProblemError
         )  # fmt: skip
-    return tuple(range(first - 1, last))
+    return tuple(range(start - 1, end))
 
 
 __all__ = [

@@ -125,8 +125,8 @@ class Elasticity:
         """Numbers of the facets between cells of different materials `(k,)`."""
         if not len(self.number):
             return np.zeros(0, dtype=np.int64)
-        one, other = self.mesh.facet_to_cell.T
-        return lock(np.nonzero((other >= 0) & (self.number[one] != self.number[other]))[0])
+        c0, c1 = self.mesh.facet_to_cell.T
+        return lock(np.nonzero((c1 >= 0) & (self.number[c0] != self.number[c1]))[0])
 
     @cached_property
     def node_moduli(self) -> Floats | None:
@@ -155,9 +155,9 @@ class Elasticity:
         """
         if self.node_moduli is None:
             return None
-        nearest = self.node_moduli @ _projection(self.mesh.dim).T
+        moduli = self.node_moduli @ _projection(self.mesh.dim).T
         at_corners = self.node_moduli[:, : self.mesh.dim + 1]
-        return lock(np.where(nearest.min(axis=1, keepdims=True) > 0, nearest, at_corners))
+        return lock(np.where(moduli.min(axis=1, keepdims=True) > 0, moduli, at_corners))
 
     def moduli(self, cell: Ints, bary: Floats) -> Floats | None:
         """Modulus of graded materials at points `(q,)`, quadratic in each cell; None without."""
@@ -303,8 +303,8 @@ class Elasticity:
 
     def toughness_at(self, x: Floats) -> Floats:
         """Toughness of the material at points `(n,)`, inf where it is not known."""
-        every = [np.inf if one.K_c is None else one.K_c for _, one in self.named]
-        return np.asarray(np.array(every)[self.sets_at(x)])
+        K_c = [np.inf if material.K_c is None else material.K_c for _, material in self.named]
+        return np.asarray(np.array(K_c)[self.sets_at(x)])
 
     def names_of(self, cells: Ints) -> list[str]:
         """Names of the cell sets that hold the materials of some cells."""
@@ -317,8 +317,8 @@ class Elasticity:
         tensor = material.tensor(self.mesh.dim)
         numbers = [
             k
-            for k, one in enumerate(self.materials)
-            if one.is_graded or not np.array_equal(one.tensor(self.mesh.dim), tensor)
+            for k, m in enumerate(self.materials)
+            if m.is_graded or not np.array_equal(m.tensor(self.mesh.dim), tensor)
         ]
         if not len(self.number):
             return cells if numbers else cells[:0]
@@ -331,7 +331,7 @@ class Elasticity:
         6 in 3D (xx, yy, zz, yz, xz, xy).
         """
         d = self.mesh.dim
-        stiffness = np.stack([_voigt(one.unit.tensor(d), frame) for one in self.materials])
+        stiffness = np.stack([_voigt(m.unit.tensor(d), frame) for m in self.materials])
         result = stiffness[self.number[cell] if len(self.number) else np.zeros_like(cell)]
         moduli = self.moduli(cell, bary)
         if moduli is not None:
@@ -359,9 +359,9 @@ class Elasticity:
         is_different[self.cells_unlike(material, np.arange(len(is_different)))] = True
         rows = np.nonzero(is_different[cell])[0]
         for n in range(gradient.shape[3] if len(rows) else 0):
-            local = np.ascontiguousarray(gradient[rows, :, :, n])
-            for part, one in self.at_points(cell[rows], bary[rows], is_exact=True):
-                change = one.stress(local[part]) - material.stress(local[part])
+            grad_u = np.ascontiguousarray(gradient[rows, :, :, n])
+            for part, m in self.at_points(cell[rows], bary[rows], is_exact=True):
+                change = m.stress(grad_u[part]) - material.stress(grad_u[part])
                 result[rows[part], :, :, n] = change
         return result
 
@@ -369,8 +369,8 @@ class Elasticity:
         if self.is_uniform:
             return np.asarray(getattr(self.materials[0], law)(tensor))
         result = np.empty_like(tensor)
-        for rows, one in self.at_points(cell, bary):
-            result[rows] = getattr(one, law)(tensor[rows])
+        for rows, material in self.at_points(cell, bary):
+            result[rows] = getattr(material, law)(tensor[rows])
         return result
 
 
@@ -414,7 +414,7 @@ def elasticity(mesh: Mesh, material: Material) -> Elasticity:
         if material_by_set[0][0]
         else nothing
     )
-    keys = [_key(one) for _, one in material_by_set]
+    keys = [_key(m) for _, m in material_by_set]
     distinct_keys = list(dict.fromkeys(keys))
     materials = tuple(material_by_set[keys.index(key)][1] for key in distinct_keys)
     number = nothing
@@ -447,10 +447,10 @@ def _set_numbers(mesh: Mesh, names: list[str]) -> Ints:
             )
         double_cells = members[number[members] >= 0]
         if len(double_cells):
-            other = names[int(number[double_cells[0]])]
+            first_set = names[int(number[double_cells[0]])]
             raise ProblemError(
                 f"material: {len(double_cells)} cells, one at "
-                f"{_cell_middle(mesh, double_cells[0])}, are in {other!r} and in {name!r}: "
+                f"{_cell_middle(mesh, double_cells[0])}, are in {first_set!r} and in {name!r}: "
                 "give each cell one material."
             )
         number[members] = k

@@ -312,8 +312,8 @@ class bearing(Load):  # noqa: N801
                 f"{self.name}: {axial_force:.4g} of the force {size:.4g} acts along the axis of "
                 "the hole, where a pin does not press: give that part by traction or resultant."
             )
-        local = hole.local(x)
-        direction = local / np.linalg.norm(local, axis=1)[:, None]
+        in_section = hole.local(x)
+        direction = in_section / np.linalg.norm(in_section, axis=1)[:, None]
         load_direction = force / np.linalg.norm(force)
         cross_direction = np.array([-load_direction[1], load_direction[0]])
         cosine, sine = direction @ load_direction, direction @ cross_direction

@@ -684,7 +684,7 @@ class MaterialSets(Material):
     def with_yield_stress(self, yield_stress: float) -> "MaterialSets":
         """All of them, judged by one yield stress."""
         return MaterialSets({
-            name: one.with_yield_stress(yield_stress) for name, one in self.materials
+            name: material.with_yield_stress(yield_stress) for name, material in self.materials
         })  # fmt: skip
 
     def check(self, dim: int) -> None:
@@ -700,11 +700,11 @@ class MaterialSets(Material):
                 material.check(dim)
             except ProblemError as error:
                 raise ProblemError(f"material of {name!r}: {error}") from None
-        other = next((n for n, m in self.materials if m.plane != self.plane), None)
-        if other is not None:
+        key = next((n for n, m in self.materials if m.plane != self.plane), None)
+        if key is not None:
             raise ProblemError(
-                f'material: {self.materials[0][0]!r} is of plane "{self.plane}", and {other!r} of '
-                f'plane "{self[other].plane}": give all the same.'
+                f'material: {self.materials[0][0]!r} is of plane "{self.plane}", and {key!r} of '
+                f'plane "{self[key].plane}": give all the same.'
             )
 
     def stiffness(self) -> Floats:

@@ -39,12 +39,12 @@ class ContactMethod:
         """Where the pressures of crack c live: `Multipliers`."""
         raise NotImplementedError
 
-    def solve_states(self, problem: Any, model: Any, engine: Any, chosen: Any, f: Floats,
-                     u_imposed: Floats, start: Any, closed: bool, acting: Any) -> Any:  # fmt: skip
+    def solve_states(self, problem: Any, model: Any, engine: Any, spaces: Any, f: Floats, u_imposed:
+                     Floats, start: Any, is_closed: bool, acting: Any) -> Any:  # fmt: skip
         """Contact of all load states, a list of `StateContact`."""
         raise NotImplementedError
 
-    def compliance(self, problem: Any, model: Any, chosen: Any) -> Floats:
+    def compliance(self, problem: Any, model: Any, space: Any) -> Floats:
         """Weak gap over traction of each spring `(g,)`, for friction."""
         raise NotImplementedError
 

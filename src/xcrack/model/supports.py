@@ -61,8 +61,8 @@ class Condition(Declared):
 @cache
 def _vectors_of(kind: Any) -> tuple[str, ...]:
     """Arguments of a condition that are vectors."""
-    every = arguments_of(kind).items()
-    return tuple(name for name, one in every if one.rule is not None and one.rule.is_vector)
+    arguments = arguments_of(kind).items()
+    return tuple(name for name, a in arguments if a.rule is not None and a.rule.is_vector)
 
 
 class Support(Condition):

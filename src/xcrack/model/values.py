@@ -205,10 +205,10 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
     _check_finite(result, x, what)
     asymmetry = np.abs(result - np.swapaxes(result, 1, 2)).max(axis=(1, 2), initial=0)
     if (asymmetry > 1e-8 * np.abs(result).max(initial=0.0)).any():
-        where = int(np.argmax(asymmetry))
+        row = int(np.argmax(asymmetry))
         raise ProblemError(
-            f"{what}: the value at {np.round(x[where], 9).tolist()} is "
-            f"{result[where].tolist()}: a stress must be symmetric."
+            f"{what}: the value at {np.round(x[row], 9).tolist()} is "
+            f"{result[row].tolist()}: a stress must be symmetric."
         )
     return result
 
@@ -221,9 +221,9 @@ def _real_values(result: Any, what: str) -> Floats:
 def _check_finite(result: Floats, x: Floats, what: str) -> None:
     is_infinite = ~np.isfinite(result).reshape(len(x), int(np.prod(result.shape[1:]))).all(axis=1)
     if is_infinite.any():
-        where = x[np.argmax(is_infinite)]
+        point = x[np.argmax(is_infinite)]
         raise ProblemError(
-            f"{what}: the value at {np.round(where, 9).tolist()} is "
+            f"{what}: the value at {np.round(point, 9).tolist()} is "
             f"{result[np.argmax(is_infinite)].tolist()}: every value must be finite."
         )
 
