@@ -170,7 +170,7 @@ def read_case(path: FileName, changes: Mapping[str, Any] | None = None) -> CaseF
         else None,
         keep_solutions=_flag(output, "keep_solutions", True),
         until=_end_conditions(root.table("growth"), problem.mesh),
-        retarded=tuple(retarded_of(each, problem, growth) for each in root.tables("retarded"))
+        retarded=tuple(retarded_of(table, problem, growth) for table in root.tables("retarded"))
         if growth
         else (),
         units=f"{units.force}, {units.length}, {units.stress}" if units.stress else None,
@@ -203,7 +203,7 @@ def _problem(root: Table) -> Problem:
     scene["numerics"] = _numerics(root.table("numerics"))
     solve_table = root.table("solve")
     solve_table.check_names((*_CHOICES, "states", *_SOLVING))
-    chosen = {name: values.argument_of(solve_table, name, Problem) for name in _CHOICES
+    choices = {name: values.argument_of(solve_table, name, Problem) for name in _CHOICES
               if name in solve_table}  # fmt: skip
     (body,) = given_bodies
     table = root.table(body)
@@ -220,10 +220,10 @@ def _problem(root: Table) -> Problem:
         root.refuse("", "the table [material] is missing: give it.")
     try:
         if body == "mesh":
-            return Problem(mesh, **scene, **chosen)
+            return Problem(mesh, **scene, **choices)
         if body == "deck":
-            return deck.problem(**scene, **chosen)  # type: ignore[no-any-return]
-        return specimen.problem(**scene, **chosen)  # type: ignore[no-any-return]
+            return deck.problem(**scene, **choices)  # type: ignore[no-any-return]
+        return specimen.problem(**scene, **choices)  # type: ignore[no-any-return]
     except XcrackError as error:
         _wrap(root, error)
 
@@ -266,10 +266,10 @@ def _changed_mesh(table: Table, mesh: Mesh) -> Mesh:
     """The mesh refined, with parts of its facet sets, and cell sets by boxes."""
     if "refine" in table:
         is_list = isinstance(table.content["refine"], list)
-        for each in table.tables("refine") if is_list else [table.table("refine")]:
-            mesh = values.called_with(each, refine, arguments={"mesh": mesh})
-    for each in table.tables("parts"):
-        mesh = values.called_with(each, part, arguments={"mesh": mesh})
+        for refinement in table.tables("refine") if is_list else [table.table("refine")]:
+            mesh = values.called_with(refinement, refine, arguments={"mesh": mesh})
+    for part_table in table.tables("parts"):
+        mesh = values.called_with(part_table, part, arguments={"mesh": mesh})
     if "cell_sets" in table:
         boxes = table.table("cell_sets")
         try:
@@ -331,21 +331,21 @@ def _criterion(table: Table) -> Any:
         if criterion not in values.CRITERIA:
             table.refuse("criterion", f"known are {', '.join(values.CRITERIA)}.")
         return values.CRITERIA[criterion]
-    chosen = table.table("criterion")
-    kind = chosen.text("kind")
+    criterion_table = table.table("criterion")
+    kind = criterion_table.text("kind")
     if kind not in values.CRITERIA:
-        chosen.refuse("kind", f"known are {', '.join(values.CRITERIA)}.")
+        criterion_table.refuse("kind", f"known are {', '.join(values.CRITERIA)}.")
     criterion_of_kind = values.CRITERIA[kind]
     argument_names = [name for name in arguments_of(criterion_of_kind) if name not in ("K", "nu")]
-    chosen.check_names(["kind", *argument_names], f" of {kind!r}")
+    criterion_table.check_names(["kind", *argument_names], f" of {kind!r}")
     choices = {}
-    for name in chosen.content:
+    for name in criterion_table.content:
         if name != "kind":
-            value = values.argument_of(chosen, name, criterion_of_kind)
+            value = values.argument_of(criterion_table, name, criterion_of_kind)
             try:
                 choices[name] = arguments_of(criterion_of_kind)[name].check(value, name)
             except XcrackError as error:
-                chosen.wrap(error)
+                criterion_table.wrap(error)
     return partial(criterion_of_kind, **choices)
 
 
@@ -411,8 +411,8 @@ def _solve_arguments(table: Table) -> Mapping[str, Any]:
         if name not in table:
             continue
         if name not in arguments_of(maker):
-            other = "with a tolerance" if maker is adapt else "without a tolerance"
-            table.refuse(name, f"it has no meaning {other}: leave one of them out.")
+            condition = "with a tolerance" if maker is adapt else "without a tolerance"
+            table.refuse(name, f"it has no meaning {condition}: leave one of them out.")
         arguments[name] = (
             _solver(table) if name == "solver" else values.argument_of(table, name, maker)
         )

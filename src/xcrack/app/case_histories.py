@@ -53,7 +53,7 @@ def load_states(table: Table, name: str) -> tuple[Any, ...]:
         loads = [state] if isinstance(state, dict) else state
         if isinstance(loads, list) and all(isinstance(load, dict) for load in loads):
             tables = Table(table.source, (*table.key, name), {str(k): loads}).tables(str(k))
-            result.append([value_of_table(each, makers_of(Load)) for each in tables])
+            result.append([value_of_table(load_table, makers_of(Load)) for load_table in tables])
         else:
             result.append(Table(table.source, table.key, {name: state}).value(name, NUMBER))
     return tuple(result)
@@ -127,7 +127,7 @@ def loading(table: Table) -> Cycle | Spectrum:
 
 def retardation_of(table: Table) -> Retardation | dict[str, Retardation]:
     """The model of a table, whose zone is a table too; or by tables one for each material."""
-    is_by_set = table.content and all(isinstance(each, dict) for each in table.content.values())
+    is_by_set = table.content and all(isinstance(part, dict) for part in table.content.values())
     if is_by_set and "zone" not in table:
         return {name: _model(table.table(name)) for name in table.content}
     return _model(table)
@@ -191,9 +191,9 @@ class CollapseFactor(Declared):
         return float(np.interp(a, self.a, self.factor))
 
 
-def _check_points(x: Floats, y: Floats, what: str, other: str) -> None:
+def _check_points(x: Floats, y: Floats, what: str, name_of_y: str) -> None:
     if len(x) != len(y) or len(x) < 2 or not (np.diff(x) > 0).all():
-        raise ProblemError(f"{what}: give two rising numbers at least, and as many of {other}.")
+        raise ProblemError(f"{what}: give two rising numbers at least, and as many of {name_of_y}.")
 
 
 def _scatter(table: Table) -> Scatter:
@@ -213,7 +213,7 @@ def _scatter(table: Table) -> Scatter:
         rows = table.content["correlation"]
         if not isinstance(rows, list) or not all(isinstance(r, list) and len(r) == 3 for r in rows):
             table.refuse("correlation", 'give a list of pairs and numbers, [["C", "m", -0.98]].')
-        arguments["correlation"] = {(one, other): rho for one, other, rho in rows}
+        arguments["correlation"] = {(p, q): rho for p, q, rho in rows}
     try:
         return Scatter(**arguments)
     except XcrackError as error:

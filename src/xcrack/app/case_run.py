@@ -186,7 +186,7 @@ def retarded_lives(case: CaseFile, history: History) -> dict[str, Retarded]:
     for arguments in case.retarded:
         kind = type(arguments["model"]).__name__
         names = chain([kind], (f"{kind}_{k}" for k in count(2)))
-        name = next(each for each in names if each not in results)
+        name = next(candidate for candidate in names if candidate not in results)
         results[name] = retarded(history, **arguments)
     return results
 
@@ -203,9 +203,9 @@ def _write_retarded(case: CaseFile, history: History) -> None:
     ):
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(("model", "a", "blocks", "ended"))
-        for name, one in lives.items():
-            rows = [[name, a, N, ""] for a, N in zip(one.a.tolist(), one.blocks.tolist())]
-            rows[-1][-1] = one.ended or "the last step"
+        for name, growth in lives.items():
+            rows = [[name, a, N, ""] for a, N in zip(growth.a.tolist(), growth.blocks.tolist())]
+            rows[-1][-1] = growth.ended or "the last step"
             writer.writerows(rows)
 
 

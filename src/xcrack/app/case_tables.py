@@ -202,11 +202,11 @@ def _change(content: dict[str, Any], key: str, value: Any, path: Path) -> None:
     place: Any = content
     parts = key.split(".")
     for n, part in enumerate(parts):
-        where = ".".join(parts[:n]) or "the file"
+        parent = ".".join(parts[:n]) or "the file"
         if isinstance(place, list):
             if not part.isdecimal() or int(part) >= len(place):
                 raise ProblemError(
-                    f"{path}: {key}: {where} is a list of {len(place)}, counted from 0: give one "
+                    f"{path}: {key}: {parent} is a list of {len(place)}, counted from 0: give one "
                     f"of its numbers in place of {part!r:.40}."
                 )
             index: Any = int(part)
@@ -215,10 +215,10 @@ def _change(content: dict[str, Any], key: str, value: Any, path: Path) -> None:
             if part not in place and n < len(parts) - 1:
                 path_text = ", ".join(place) or "nothing"
                 raise ProblemError(
-                    f"{path}: {key}: {where} has no {part!r:.40}; it has {path_text}."
+                    f"{path}: {key}: {parent} has no {part!r:.40}; it has {path_text}."
                 )
         else:
-            raise ProblemError(f"{path}: {key}: {where} is {place!r:.40}, which has no parts.")
+            raise ProblemError(f"{path}: {key}: {parent} is {place!r:.40}, which has no parts.")
         if n == len(parts) - 1:
             place[index] = value
         else:

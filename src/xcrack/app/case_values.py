@@ -81,8 +81,8 @@ MESHES: dict[str, Callable[..., Any]] = {
     "notched_cylinder": notched_cylinder,
 }
 SPECIMENS: dict[str, Callable[..., Any]] = {
-    each.__name__: each
-    for each in (compact_tension, disc_compact, lug, middle_tension, single_edge_bend,
+    specimen.__name__: specimen
+    for specimen in (compact_tension, disc_compact, lug, middle_tension, single_edge_bend,
                  single_edge_tension)
 }  # fmt: skip
 CRACKS: dict[str, Callable[..., Any]] = {
@@ -125,7 +125,7 @@ def _rate_table(
     curves: Annotated[Any, Parts(RateCurve)], outside: str = "refuse", ratio: str | None = None
 ) -> rate_table:
     """A table of rates from a list of curves, each with R, dK and rate."""
-    points = {each.R: (each.dK, each.rate) for each in curves}
+    points = {curve.R: (curve.dK, curve.rate) for curve in curves}
     return rate_table(points, outside, ratio)  # type: ignore[arg-type]
 
 
@@ -237,12 +237,12 @@ def argument_of(table: Table, name: str, maker: Callable[..., Any]) -> Any:
     if isinstance(rule, Part) and isinstance(value, dict):
         return _part(table.table(name), rule.kind)
     if isinstance(rule, Parts | OneOrMore) and _are_tables(value):
-        return [_part(each, rule.kind) for each in table.tables(name)]
+        return [_part(part_table, rule.kind) for part_table in table.tables(name)]
     if isinstance(rule, _FIELDS) and isinstance(value, dict):
-        inner = table.table(name)
-        if _WORD in inner:
-            return value_of_table(inner, makers_of(GrowthLaw))
-        return called_with(inner, read_field)
+        field_table = table.table(name)
+        if _WORD in field_table:
+            return value_of_table(field_table, makers_of(GrowthLaw))
+        return called_with(field_table, read_field)
     if isinstance(rule, Function):
         table.refuse(name, f"{value!r:.60} is no function.{_WAY}")
     if isinstance(rule, Number) and isinstance(value, dict):

@@ -207,10 +207,10 @@ class _Writing:
             ("handbook", values.HANDBOOK),
         ):
             tables[name] = [
-                self._crack(each)
+                self._crack(part)
                 if name == "cracks"
-                else self._table(each, makers, f"{name}[{k}], {getattr(each, 'name', each.kind)}")
-                for k, each in enumerate(getattr(problem, name))
+                else self._table(part, makers, f"{name}[{k}], {getattr(part, 'name', part.kind)}")
+                for k, part in enumerate(getattr(problem, name))
             ]
         tables["solve"] = {"order": problem.order, "contact": problem.contact}
         if any(problem.frictions):
@@ -291,8 +291,8 @@ class _Writing:
             (pairs,) = (getattr(value, field.name) for field in fields(value))
             value = dict(pairs)
         if isinstance(value, Mapping):
-            return {name: self._table(one, makers, f"{what} of {name!r}")
-                    for name, one in value.items()}  # fmt: skip
+            return {name: self._table(value_of_set, makers, f"{what} of {name!r}")
+                    for name, value_of_set in value.items()}  # fmt: skip
         return self._table(value, makers, what)
 
     def _table(self, value: Any, makers: Any, what: str) -> dict[str, Any]:
@@ -335,10 +335,10 @@ class _Writing:
         if isinstance(value, tuple) and hasattr(value, "_asdict"):  # a curve of a rate_table
             value = value._asdict()
         if isinstance(value, list | tuple):
-            return [self._plain_value(each, f"{what}[{k}]") for k, each in enumerate(value)]
+            return [self._plain_value(entry, f"{what}[{k}]") for k, entry in enumerate(value)]
         if isinstance(value, Mapping):
             return {
-                name: self._plain_value(each, f"{what}: {name}") for name, each in value.items()
+                name: self._plain_value(entry, f"{what}: {name}") for name, entry in value.items()
             }
         if isinstance(value, Field):
             return self._field(value)
@@ -365,8 +365,8 @@ class _Writing:
         )
 
     def _name(self, value: Any, public_values: Mapping[str, Any], what: str) -> str:
-        for name, one in public_values.items():
-            if one is value:
+        for name, public_value in public_values.items():
+            if public_value is value:
                 return name
         self._refuse(what, "function")
 
@@ -398,7 +398,7 @@ def _toml(value: Any, is_long: bool = False) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{_key(k)} = {_toml(v)}' for k, v in value.items())} }}"
-    entries = [_toml(each) for each in value]
+    entries = [_toml(entry) for entry in value]
     text = f"[{', '.join(entries)}]"
     if not is_long or len(text) <= _WIDTH:
         return text

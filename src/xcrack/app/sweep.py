@@ -88,8 +88,8 @@ def sweep(
     target = file.with_name(f"{file.stem}_sweep") if folder is None else Path(folder)
     with system_errors("the scene cannot be read from", file, error=ProblemError):
         text = file.read_text(encoding="utf-8")
-    one = partial(run_changed, str(file), text, str(target))
-    study = campaign(one, cases, path=target, workers=workers, retry=retry)
+    run_case = partial(run_changed, str(file), text, str(target))
+    study = campaign(run_case, cases, path=target, workers=workers, retry=retry)
     _write(study, keys, title, target)
     return study
 
@@ -120,7 +120,7 @@ def run_changed(file: str, text: str, folder: str, /, **changes: Any) -> dict[st
         "steps": len(history.steps),
         "ended": history.ended,
         "folder": steps.parent.name,
-        **{f"life_{name}": one.life for name, one in retarded_lives(case, history).items()},
+        **{f"life_{name}": life.life for name, life in retarded_lives(case, history).items()},
     }
 
 
@@ -130,11 +130,11 @@ def _largest_K(solutions: Sequence[Solution]) -> dict[str, float]:
     n = len(solutions[0].problem.cracks)
     for c in range(n):
         for k, sif in enumerate(stress_intensities(solutions, c)):
-            where = f" of crack {c}" if n > 1 else ""
-            where += f" in state {k}" if len(solutions) > 1 else ""
+            suffix = f" of crack {c}" if n > 1 else ""
+            suffix += f" in state {k}" if len(solutions) > 1 else ""
             for mode, column in zip(_MODES, sif.K.T):
                 j = int(np.argmax(column if mode == "K_I" else np.abs(column)))
-                result[mode + where] = float(column[j])
+                result[mode + suffix] = float(column[j])
     if not result:
         result["energy"] = float(solutions[-1].energy)
     return result
