@@ -41,7 +41,7 @@ class CurvedSides:
             facet_to_curve[numbers_of(mesh, mesh.facet_sets[name])] = k
         return cls(tuple(mesh.curves.values()), facet_to_curve, _OFF * mesh.extent)
 
-    def nearest(self, x: Floats, facet: Ints) -> Floats:
+    def project(self, x: Floats, facet: Ints) -> Floats:
         """Points of facets of the mesh `(k, d)`, put onto the curves of these."""
         result, number = x.copy(), self.facet_to_curve[facet]
         for k, curve in enumerate(self.curves):
@@ -80,14 +80,14 @@ class CurvedSides:
             nodes, simplices = lattice_parts(x.shape[1], n)
             places = np.einsum("nv,kvd->knd", nodes, x[rows])
             owner = np.repeat(facet[rows], len(nodes))
-            places = self.nearest(places.reshape(-1, x.shape[2]), owner).reshape(places.shape)
+            places = self.project(places.reshape(-1, x.shape[2]), owner).reshape(places.shape)
             values = np.einsum("nv,kvm->knm", nodes, data[rows])
             parts.append((
                 places[:, simplices].reshape(-1, *x.shape[1:]),
                 values[:, simplices].reshape(-1, *data.shape[1:]),
                 np.repeat(facet[rows], len(simplices)),
             ))  # fmt: skip
-        points, values, owner = (np.concatenate(each) for each in zip(*parts, strict=True))
+        points, values, owner = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return points, values, owner
 
     def bend_edges(self, x: Floats, facet: Ints, data: Floats) -> tuple[Floats, Floats]:
@@ -105,32 +105,32 @@ class CurvedSides:
         x, facet, data = x[is_beside], facet[is_beside], data[is_beside]
         edges = np.stack([x, np.roll(x, -1, axis=1)], axis=2)
         rows, edge = np.nonzero(facet >= 0)
-        every = np.ones(len(x), dtype=np.int64)
+        part_counts = np.ones(len(x), dtype=np.int64)
         for n, members in self._by_parts(edges[rows, edge], facet[rows, edge]):
-            np.maximum.at(every, rows[members], n)
-        for n in np.unique(every).tolist():
-            chosen = np.nonzero(every == n)[0]
+            np.maximum.at(part_counts, rows[members], n)
+        for n in np.unique(part_counts).tolist():
+            rows_of_count = np.nonzero(part_counts == n)[0]
             nodes, simplices = lattice_parts(3, n)
-            places = np.einsum("nv,kvd->knd", nodes, x[chosen])
+            places = np.einsum("nv,kvd->knd", nodes, x[rows_of_count])
             for e in range(3):
-                has_facet = np.nonzero(facet[chosen, e] >= 0)[0]
-                one, other, opposite_weight = (
+                has_facet = np.nonzero(facet[rows_of_count, e] >= 0)[0]
+                start_weight, end_weight, opposite_weight = (
                     nodes[:, e],
                     nodes[:, (e + 1) % 3],
                     nodes[:, (e + 2) % 3],
                 )
-                share = other / np.maximum(one + other, 1e-300)
-                a, b = (edges[chosen[has_facet], e, side][:, None] for side in (0, 1))
+                share = end_weight / np.maximum(start_weight + end_weight, 1e-300)
+                a, b = (edges[rows_of_count[has_facet], e, side][:, None] for side in (0, 1))
                 chord = a + share[:, None] * (b - a)
-                owner = np.repeat(facet[chosen[has_facet], e], len(nodes))
-                arc = self.nearest(chord.reshape(-1, x.shape[2]), owner).reshape(chord.shape)
+                owner = np.repeat(facet[rows_of_count[has_facet], e], len(nodes))
+                arc = self.project(chord.reshape(-1, x.shape[2]), owner).reshape(chord.shape)
                 places[has_facet] += ((1 - opposite_weight) ** 2)[:, None] * (arc - chord)
-            values = np.einsum("nv,kvm->knm", nodes, data[chosen])
+            values = np.einsum("nv,kvm->knm", nodes, data[rows_of_count])
             parts.append((
                 places[:, simplices].reshape(-1, 3, x.shape[2]),
                 values[:, simplices].reshape(-1, 3, data.shape[2]),
             ))  # fmt: skip
-        points, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+        points, values = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return points, values
 
     def facets_of_edges(self, triangles: Ints, segments: Ints, facet: Ints) -> Ints:
@@ -149,14 +149,14 @@ class CurvedSides:
         if not len(on_curve):
             return result
         count = np.int64(max(int(triangles.max(initial=0)), int(segments.max(initial=0))) + 1)
-        low, high = np.sort(segments[on_curve], axis=1).T
-        key = low * count + high
+        min_point, max_point = np.sort(segments[on_curve], axis=1).T
+        key = min_point * count + max_point
         order = np.argsort(key)
         key = key[order]
         for e in range(3):
-            low, high = np.sort(triangles[:, [e, (e + 1) % 3]], axis=1).T
-            place = np.minimum(np.searchsorted(key, low * count + high), len(key) - 1)
-            on_key = key[place] == low * count + high
+            min_point, max_point = np.sort(triangles[:, [e, (e + 1) % 3]], axis=1).T
+            place = np.minimum(np.searchsorted(key, min_point * count + max_point), len(key) - 1)
+            on_key = key[place] == min_point * count + max_point
             result[on_key, e] = facet[on_curve[order[place[on_key]]]]
         return result
 
@@ -167,7 +167,7 @@ class CurvedSides:
         for i in range(v):
             for j in range(i):
                 middle = (x[:, i] + x[:, j]) / 2
-                offset = np.linalg.norm(self.nearest(middle, facet) - middle, axis=1)
+                offset = np.linalg.norm(self.project(middle, facet) - middle, axis=1)
                 height = np.maximum(height, offset)
         halvings = np.clip(np.ceil(np.log2(np.maximum(height / self.gap, 1.0)) / 2), 0, None)
         parts = np.minimum(2 ** halvings.astype(np.int64), _MOST_PARTS)
@@ -177,10 +177,10 @@ class CurvedSides:
 
 def boundary_lines(mesh: Mesh) -> Floats:
     """Edges of the boundary of a 2D mesh `(k, 2, 2)`, in parts where they are curved."""
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-    x = mesh.points[mesh.facets[outer]]
+    outer_facets = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    x = mesh.points[mesh.facets[outer_facets]]
     sides = CurvedSides.of(mesh)
-    return x if sides is None else sides.on_curves(x, outer)
+    return x if sides is None else sides.on_curves(x, outer_facets)
 
 
 def lattice_parts(corners: int, n: int) -> tuple[Floats, Ints]:
@@ -192,10 +192,10 @@ def lattice_parts(corners: int, n: int) -> tuple[Floats, Ints]:
     number = np.full((n + 2, n + 2), -1)
     number[i, j] = np.arange(len(i))
     first = i + j < n
-    second = i + j < n - 1
+    has_inverted = i + j < n - 1
     parts = [
         np.stack([number[i, j], number[i + 1, j], number[i, j + 1]], axis=1)[first],
-        np.stack([number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]], axis=1)[second],
+        np.stack([number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]], axis=1)[has_inverted],
     ]
     return np.stack([n - i - j, i, j], axis=1) / n, np.concatenate(parts)
 
@@ -214,12 +214,12 @@ def shading_normals(corners: Floats) -> Floats:
     sorted_place = place[order]
     for step_on in range(1, int(np.bincount(place).max(initial=1))):
         is_same: Bools = sorted_place[step_on:] == sorted_place[:-step_on]
-        one, other = order[step_on:][is_same], order[:-step_on][is_same]
-        cosine = np.einsum("kd,kd->k", unit[owner[one]], unit[owner[other]])
+        p, q = order[step_on:][is_same], order[:-step_on][is_same]
+        cosine = np.einsum("kd,kd->k", unit[owner[p]], unit[owner[q]])
         is_aligned = np.abs(cosine) > _ALIKE  # triangles run round in either sense
-        one, other, sign = one[is_aligned], other[is_aligned], np.sign(cosine[is_aligned])[:, None]
-        np.add.at(total, one, sign * normal[owner[other]])
-        np.add.at(total, other, sign * normal[owner[one]])
+        p, q, sign = p[is_aligned], q[is_aligned], np.sign(cosine[is_aligned])[:, None]
+        np.add.at(total, p, sign * normal[owner[q]])
+        np.add.at(total, q, sign * normal[owner[p]])
     length = np.linalg.norm(total, axis=1)
     return np.asarray((total / np.maximum(length, 1e-300)[:, None]).reshape(-1, 3, 3))
 

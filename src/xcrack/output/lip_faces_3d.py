@@ -94,11 +94,11 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     is_reversed = np.einsum("td,td->t", area_vector, cut.lip_normal) < 0
     number = _merged_numbers(corners.reshape(-1, 3), _SAME * float(mesh.cell_size.min()))
     n = int(number.max(initial=-1)) + 1
-    one = np.zeros(n, dtype=np.int64)
-    one[number] = np.arange(len(number))
+    corner = np.zeros(n, dtype=np.int64)
+    corner[number] = np.arange(len(number))
     triangles = number.reshape(-1, 3)
     triangles = np.where(is_reversed[:, None], triangles[:, [0, 2, 1]], triangles)
-    owner, vertex = one // 3, one % 3
+    owner, vertex = corner // 3, corner % 3
     moved_points = []
     for k in (0, 1):
         cell, bary = cut.lip_cell[owner, k], cut.lip_bary[owner, k, vertex]
@@ -121,17 +121,17 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
     )
     at_corner = _at_corners(solution, crack, pressure)
     edges, row = rim(triangles)
-    on_front = _on_front(solution, crack, one)
+    on_front = _on_front(solution, crack, corner)
     is_front_edge = on_front[edges].all(axis=1) & (area[row] > 0)
-    ends = _on_other(solution, crack, one)[edges].all(axis=1) & ~is_front_edge
+    ends = _on_other(solution, crack, corner)[edges].all(axis=1) & ~is_front_edge
     leaves = ~is_front_edge & ~ends
     if any(crack in (joint.crack, joint.on) for joint in space.joints):
         # Faces that an arm splits lie beside whole ones: such edges are no mouth.
-        middle = corners.reshape(-1, 3)[one][edges].mean(axis=1)
+        middle = corners.reshape(-1, 3)[corner][edges].mean(axis=1)
         depth, size = Body.of(mesh).depth(middle)
         leaves &= np.abs(depth) < _AT_SIDE * size
     return LipFaces(
-        points=lock(corners.reshape(-1, 3)[one]),
+        points=lock(corners.reshape(-1, 3)[corner]),
         triangles=lock(triangles),
         normal=lock(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)),
         pressure=lock(np.bincount(number, share * at_corner.ravel(), n) / area_around),
@@ -157,11 +157,11 @@ def junction_lines(solution: Solution, crack: int | None = None) -> list[tuple[L
     return [(lips, lips.junction) for lips in (lip_faces(solution, arm) for arm in sorted(arms))]
 
 
-def _on_other(solution: Solution, crack: int, one: Ints) -> Bools:
+def _on_other(solution: Solution, crack: int, corner: Ints) -> Bools:
     """Which vertices of the triangles of a crack lie on one on which it ends `(n,)`."""
     space, cut = solution.space, solution.space.cuts[crack]
-    cells, bary = cut.lip_cell[one // 3, 0], cut.lip_bary[one // 3, 0, one % 3]
-    corners, result = space.mesh.cells[cells], np.zeros(len(one), dtype=bool)
+    cells, bary = cut.lip_cell[corner // 3, 0], cut.lip_bary[corner // 3, 0, corner % 3]
+    corners, result = space.mesh.cells[cells], np.zeros(len(corner), dtype=bool)
     for joint in space.joints:
         if joint.crack == crack:
             phi = space.cuts[joint.on].level_set.phi[corners]
@@ -200,12 +200,12 @@ def _at_corners(solution: Solution, crack: int, values: Floats) -> Floats:
     mean = rhs.sum(axis=1) / np.maximum(mass.sum(axis=(1, 2)), 1e-300)
     regularisation = 1e-9 * np.eye(3)
     fit = np.linalg.solve(mass + regularisation, (rhs + 1e-9 * mean[:, None])[..., None])[..., 0]
-    low = np.full(t, np.inf)
-    high = np.full(t, -np.inf)
-    np.minimum.at(low, lips.segment, values)
-    np.maximum.at(high, lips.segment, values)
-    reach = (high - low)[:, None]
-    bounded = np.clip(fit, low[:, None] - reach, high[:, None] + reach)
+    min_value = np.full(t, np.inf)
+    max_value = np.full(t, -np.inf)
+    np.minimum.at(min_value, lips.segment, values)
+    np.maximum.at(max_value, lips.segment, values)
+    reach = (max_value - min_value)[:, None]
+    bounded = np.clip(fit, min_value[:, None] - reach, max_value[:, None] + reach)
     return np.where(np.isfinite(bounded), bounded, mean[:, None])
 
 
@@ -215,17 +215,17 @@ def _in_triangles(corners: Floats, x: Floats) -> Floats:
     normal = np.cross(a, b)
     square = np.maximum(np.einsum("qd,qd->q", normal, normal), 1e-300)
     y = x - corners[:, 0]
-    second = np.einsum("qd,qd->q", np.cross(y, b), normal) / square
+    second_weight = np.einsum("qd,qd->q", np.cross(y, b), normal) / square
     third_weight = np.einsum("qd,qd->q", np.cross(a, y), normal) / square
-    return np.stack([1 - second - third_weight, second, third_weight], axis=1)
+    return np.stack([1 - second_weight - third_weight, second_weight, third_weight], axis=1)
 
 
-def _on_front(solution: Solution, crack: int, one: Ints) -> Bools:
-    """Which vertices lie on a front; `one` are their places in the list of all corners."""
+def _on_front(solution: Solution, crack: int, corner: Ints) -> Bools:
+    """Which vertices lie on a front; `corner` are their places in the list of all corners."""
     cut, mesh = solution.space.cuts[crack], solution.space.mesh
-    cell = cut.lip_cell[one // 3, 1]
-    bary = cut.lip_bary[one // 3, 1, one % 3]
-    flag = np.zeros(len(one), dtype=bool)
+    cell = cut.lip_cell[corner // 3, 1]
+    bary = cut.lip_bary[corner // 3, 1, corner % 3]
+    flag = np.zeros(len(corner), dtype=bool)
     for psi in cut.level_set.psi:
         at = np.einsum("qb,qb->q", bary, psi[mesh.cells[cell]])
         flag |= np.abs(at) < 1e-8 * mesh.cell_size[cell]

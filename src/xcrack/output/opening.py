@@ -59,9 +59,9 @@ def crack_opening(
                 f"crack_opening: x has the shape {places.shape}: give points (n, {d}) or one."
             )
     lips = solution.lips[c]
-    distance, nearest = cKDTree(lips.x).query(points)
-    normal = lips.normal[nearest]
-    normal_distance = np.abs(np.einsum("qd,qd->q", points - lips.x[nearest], normal))
+    distance, nearest_rows = cKDTree(lips.x).query(points)
+    normal = lips.normal[nearest_rows]
+    normal_distance = np.abs(np.einsum("qd,qd->q", points - lips.x[nearest_rows], normal))
     if (normal_distance > 0.5 * distance + _NEAR * solution.problem.mesh.extent).any():
         farthest_point = points[int(np.argmax(normal_distance))]
         raise ProblemError(
@@ -164,9 +164,9 @@ def energy_error(
             result, "energy_error: the stress at points (n, d)", (*x.shape, x.shape[1])
         )
         difference = exact_stress - solution.stress_at(points.cell, points.bary, points.side)
-        where = points.cell, points.bary
-        error += _energy(elasticity.strain(difference, *where), difference, points.weight)
-        total += _energy(elasticity.strain(exact_stress, *where), exact_stress, points.weight)
+        places = points.cell, points.bary
+        error += _energy(elasticity.strain(difference, *places), difference, points.weight)
+        total += _energy(elasticity.strain(exact_stress, *places), exact_stress, points.weight)
     if not total > 0:
         raise ProblemError(
             "energy_error: the exact stress is zero everywhere, so there is no relative error."

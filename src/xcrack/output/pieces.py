@@ -109,8 +109,8 @@ def _halve_edges(
         for triangle in triangles:
             rows.append(rows_of_pattern)
             parts.append(nodes[rows_of_pattern][:, triangle])
-    every = np.concatenate(rows)
-    return cell[every], np.concatenate(parts), side[every]
+    all_rows = np.concatenate(rows)
+    return cell[all_rows], np.concatenate(parts), side[all_rows]
 
 
 def _without_exits(space: FunctionSpace, subs: SubCells) -> tuple[Ints, Floats, Ints]:
@@ -247,16 +247,16 @@ def pieces(solution: Solution) -> Pieces:
     )
     stress, center = zip(*[_stresses(solution, block) for block in blocks], strict=True)
     weight = np.concatenate([block.weight for block in blocks])
-    every, origin = np.concatenate(point), np.arange(n)
+    ids, origin = np.concatenate(point), np.arange(n)
     set_number = solution.problem.elasticity.set_number
     if len(set_number):
         owner = np.concatenate([block.places[0] for block in blocks])
-        every, origin = _apart_by_material(every, set_number[owner], n)
+        ids, origin = _apart_by_material(ids, set_number[owner], n)
         n, x, u, source = len(origin), x[origin], u[origin], source[origin]
-        number, joined_numbers = every[: number.size].reshape(number.shape), every[number.size :]
-    total = np.bincount(every, weight, n)
+        number, joined_numbers = ids[: number.size].reshape(number.shape), ids[number.size :]
+    total = np.bincount(ids, weight, n)
     values = np.concatenate(stress).reshape(-1, 9)
-    mean = np.stack([np.bincount(every, weight * v, n) / total for v in values.T], axis=1)
+    mean = np.stack([np.bincount(ids, weight * v, n) / total for v in values.T], axis=1)
 
     cell, bary = (np.concatenate([b.places[i] for b in blocks]) for i in (0, 1))
     corner = mesh.cells[cell[source]]
@@ -342,8 +342,8 @@ def _join(
     point[group[: len(shared_rows)]] = shared_rows
     new_points = np.nonzero(point < 0)[0]
     point[new_points] = n_plain + np.arange(len(new_points))
-    _, one = np.unique(group, return_index=True)
-    source = np.concatenate([first, n_rows + one[new_points] - len(shared_rows)])
+    _, group_rows = np.unique(group, return_index=True)
+    source = np.concatenate([first, n_rows + group_rows[new_points] - len(shared_rows)])
     return point[group[len(shared_rows) :]], n_plain + len(new_points), source
 
 
@@ -352,11 +352,11 @@ def _place_numbers(key: Floats) -> Ints:
 
     Most rows are equal when rounded; only one of these is compared with others.
     """
-    _, one, group_of_place = np.unique(
+    _, place_rows, group_of_place = np.unique(
         np.round(key / _SAME).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )
-    pairs = cKDTree(key[one]).query_pairs(_SAME, output_type="ndarray")
-    n = len(one)
+    pairs = cKDTree(key[place_rows]).query_pairs(_SAME, output_type="ndarray")
+    n = len(place_rows)
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, group = connected_components(links, directed=False)
     return np.asarray(group[group_of_place.ravel()], dtype=np.int64)
@@ -379,10 +379,10 @@ def _stresses(solution: Solution, block: _Block) -> tuple[Floats, Floats]:
     """Stress at the nodes of pieces, and at their centres."""
     cell, bary, side = block.places
     center = block.center[1]
-    each = len(cell) // max(len(center), 1)
+    n_nodes = len(cell) // max(len(center), 1)
     if solution.space.tips:
-        inner = (bary + np.repeat(center, each, axis=0)) / 2
-        bary = np.where(_at_tip(solution.space, cell, bary)[:, None], inner, bary)
+        inner_bary = (bary + np.repeat(center, n_nodes, axis=0)) / 2
+        bary = np.where(_at_tip(solution.space, cell, bary)[:, None], inner_bary, bary)
     return full_stress(solution, cell, bary, side), full_stress(solution, *block.center)
 
 

@@ -167,35 +167,35 @@ def _write_grid(body: Pieces, path: Path) -> None:
 
 def _write_lips(solution: Solution, path: Path) -> None:
     lips = [lips_of(solution, c) for c in range(len(solution.lips))]
-    start = np.cumsum([0, *(len(each.s) for each in lips)])
-    runs = [(c, start[c] + run) for c, each in enumerate(lips) for run in each.runs]
+    start = np.cumsum([0, *(len(lip.s) for lip in lips)])
+    runs = [(c, start[c] + run) for c, lip in enumerate(lips) for run in lip.runs]
     vectors: dict[str, list[np.ndarray]] = {
-        "normal": [each.normal for each in lips],
-        "opening": [each.jump for each in lips],
-        "displacement_minus": [each.minus for each in lips],
-        "displacement_plus": [each.plus for each in lips],
+        "normal": [lip.normal for lip in lips],
+        "opening": [lip.jump for lip in lips],
+        "displacement_minus": [lip.minus for lip in lips],
+        "displacement_plus": [lip.plus for lip in lips],
     }
     scalars: dict[str, list[np.ndarray]] = {
-        "pressure": [each.pressure for each in lips],
-        "gap": [each.gap for each in lips],
-        "closed": [each.closed.astype(np.int8) for each in lips],
-        "s": [each.s for each in lips],
-        "weight": [each.weight for each in solution.lips],
+        "pressure": [lip.pressure for lip in lips],
+        "gap": [lip.gap for lip in lips],
+        "closed": [lip.closed.astype(np.int8) for lip in lips],
+        "s": [lip.s for lip in lips],
+        "weight": [lip.weight for lip in solution.lips],
     }
     if any(solution.problem.frictions):
-        shear_of_lips = [(lip_shear(solution, c), len(each.s)) for c, each in enumerate(lips)]
+        shear_of_lips = [(lip_shear(solution, c), len(lip.s)) for c, lip in enumerate(lips)]
         vectors["shear"] = [np.zeros((n, 2)) if t is None else t for t, n in shear_of_lips]
         stuck_flags = [None if c is None else c.stuck for c in solution.contact]
         scalars["stuck"] = [
-            np.zeros(len(each.s), np.int8) if stuck_points is None else stuck_points.astype(np.int8)
-            for stuck_points, each in zip(stuck_flags, lips, strict=True)
+            np.zeros(len(lip.s), np.int8) if stuck_points is None else stuck_points.astype(np.int8)
+            for stuck_points, lip in zip(stuck_flags, lips, strict=True)
         ]
     d = solution.space.dim
     at_points = {name: np.concatenate(values) for name, values in scalars.items()}
     for name, parts in vectors.items():
         at_points[name] = np.pad(np.concatenate(parts), ((0, 0), (0, 3 - d)))
     data = _vtk("vtkCommonDataModel").vtkPolyData()
-    data.SetPoints(_points(np.concatenate([each.x for each in lips])))
+    data.SetPoints(_points(np.concatenate([lip.x for lip in lips])))
     data.SetLines(_cells([run[None] for _, run in runs]))
     _save(
         _vtk("vtkIOXML").vtkXMLPolyDataWriter(),
@@ -208,16 +208,16 @@ def _write_lips(solution: Solution, path: Path) -> None:
 
 def _write_lip_faces(solution: Solution, path: Path) -> None:
     lips = [lip_faces(solution, c) for c in range(len(solution.lips))]
-    start = np.cumsum([0, *(len(each.points) for each in lips)])
+    start = np.cumsum([0, *(len(lip.points) for lip in lips)])
 
     def joined_values(name: str) -> np.ndarray:
-        return np.concatenate([getattr(each, name) for each in lips])
+        return np.concatenate([getattr(lip, name) for lip in lips])
 
     at_points = {name: joined_values(name) for name in ("pressure", "gap", "normal")}
     at_points["opening"] = joined_values("jump")
     at_points |= {f"displacement_{name}": joined_values(name) for name in ("minus", "plus")}
     at_cells: dict[str, np.ndarray] = {
-        "crack": np.repeat(np.arange(len(lips)), [len(each.area) for each in lips]),
+        "crack": np.repeat(np.arange(len(lips)), [len(lip.area) for lip in lips]),
         "closed": (joined_values("closed") >= 0.5).astype(np.int8),
         "closed_share": joined_values("closed"),
         "pressure_mean": joined_values("mean_pressure"),
@@ -225,7 +225,7 @@ def _write_lip_faces(solution: Solution, path: Path) -> None:
     }
     data = _vtk("vtkCommonDataModel").vtkPolyData()
     data.SetPoints(_points(joined_values("points")))
-    faces = [each.triangles + begin for each, begin in zip(lips, start, strict=False)]
+    faces = [lip.triangles + begin for lip, begin in zip(lips, start, strict=False)]
     data.SetPolys(_cells([np.concatenate(faces)]))
     _save(_vtk("vtkIOXML").vtkXMLPolyDataWriter(), data, at_points, at_cells, path)
 
@@ -246,7 +246,7 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
                 f"K_{name}": getattr(sif_of_crack, f"K_{name}")[is_on_front]
                 for name in ("I", "II", "III")
             }
-            if all(one.errors is not None for one in sif):
+            if all(crack_sif.errors is not None for crack_sif in sif):
                 names = ("I", "II", "III")
                 line |= {f"bar_{m}": sif_of_crack.bar[is_on_front, k] for k, m in enumerate(names)}
             line["at_surface"] = sif_of_crack.at_surface[is_on_front].astype(np.int8)
@@ -262,10 +262,10 @@ def _write_fronts(solution: Solution, sif: Sequence[SIF], path: Path) -> None:
         # K is known inside the body: a closed front that leaves it in part is open there.
         is_complete = front[0] == front[-1] and len(run) == len(front) - 1
         runs.append(np.append(run, run[:1]) if is_complete else run)
-    every = {name: np.concatenate([line[name] for line in lines]) for name in lines[0]}
-    frame = every.pop("frame")
-    x = every.pop("x")
-    at_points = {"ahead": frame[:, 0], "normal": frame[:, 1], **every}
+    columns = {name: np.concatenate([line[name] for line in lines]) for name in lines[0]}
+    frame = columns.pop("frame")
+    x = columns.pop("x")
+    at_points = {"ahead": frame[:, 0], "normal": frame[:, 1], **columns}
     at_cells = {
         "crack": np.array([tip.crack for tip in tips]),
         "front": np.array([tip.number for tip in tips]),

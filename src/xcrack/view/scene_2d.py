@@ -139,7 +139,7 @@ def _onto_curves(
     x, bends = points.copy(), curved_sides.facet_to_curve[facet] >= 0
     number, first = np.unique(edge[bends], return_index=True)
     of_point = np.repeat(facet[bends], 3)[first]
-    x[number[number >= 0]] = curved_sides.nearest(x[number[number >= 0]], of_point[number >= 0])
+    x[number[number >= 0]] = curved_sides.project(x[number[number >= 0]], of_point[number >= 0])
     a, b, middle = edge.T
     has_middle = middle >= 0
     halves = [

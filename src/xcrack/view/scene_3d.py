@@ -160,7 +160,7 @@ def space_scene(
         at_rest = at_rest.copy()
         number, first = np.unique(on.shell, return_index=True)
         facet = _on_curve(curved_sides, on)
-        at_rest[number] = curved_sides.nearest(at_rest[number], facet[first])
+        at_rest[number] = curved_sides.project(at_rest[number], facet[first])
     level = levels(at_rest, plane)
     parts = [TriangleSoup.of(on.shell, None, on.of_shell).part_behind(level)]
     parts.append(TriangleSoup.of(on.lip).part_behind(level))
