@@ -275,17 +275,17 @@ def _by_resistance(
         )
     )
     what = f"the resistance of step {steps[0].index}"
-    best = 0.0
+    largest_factor = 0.0
     for x in places:
         K_R = call_function(resistance, what, float(x - length[0]))
         K_R = number(K_R, "residual_strength: resistance", least=0)
         K_x = float(np.interp(x, length, size))
-        best = max(best, K_R / K_x if K_x > 0 else np.inf)
-    if best == 0:
+        largest_factor = max(largest_factor, K_R / K_x if K_x > 0 else np.inf)
+    if largest_factor == 0:
         raise ProblemError(
             "residual_strength: resistance is 0 over the whole run: give K_R over the extension."
         )
-    return best
+    return largest_factor
 
 
 _PLACES = 20  # between two steps at which an R-curve is looked at
@@ -312,10 +312,10 @@ def _by_link_up(step: Step, nu: float, yield_stress: float) -> float:
     if not tips or len(tips[0][1]) != 2:
         return np.nan
     factor = np.inf
-    for (c, x, direction, K), (d, y, other, L) in combinations(tips, 2):
+    for (c, x, direction, K), (d, y, second_direction, L) in combinations(tips, 2):
         way = y - x
         ligament = float(np.linalg.norm(way))
-        faces = min(way @ direction, -(way @ other)) > _FACING * ligament
+        faces = min(way @ direction, -(way @ second_direction)) > _FACING * ligament
         if c != d and faces and K**2 + L**2 > 0:
             zones = (K**2 + L**2) / (2 * np.pi * yield_stress**2)
             factor = min(factor, float(np.sqrt(ligament / zones)))

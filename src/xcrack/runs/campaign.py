@@ -104,8 +104,8 @@ def run_case(case: Callable[..., Any], parameters: dict[str, Any]) -> dict[str, 
 def _numbers(value: Any, parameters: Parameters) -> dict[str, Any]:
     """Result of a case: life and end of a history, or the numbers that the case returned."""
     if isinstance(value, History):
-        last = value.steps[-1].index if value.steps else -1
-        value = {"life": value.life, "steps": last + 1, "ended": value.ended}
+        last_index = value.steps[-1].index if value.steps else -1
+        value = {"life": value.life, "steps": last_index + 1, "ended": value.ended}
     if isinstance(value, Mapping):
         result = {}
         for name, value_of_name in value.items():
@@ -448,21 +448,21 @@ def campaign(
         raise ProblemError(
             f"campaign: client = {value_text(client)}: give one that has submit(...)."
         )
-    every = {key_of(each): each for each in (checked_case(c, n) for n, c in enumerate(case_list))}
-    if not every:
+    cases_by_key = {key_of(p): p for p in (checked_case(c, n) for n, c in enumerate(case_list))}
+    if not cases_by_key:
         raise ProblemError("campaign: cases is empty: give one, at least.")
     with system_errors("the study cannot be written to", folder, error=ProblemError):
         folder.mkdir(parents=True, exist_ok=True)
     with lock_folder(folder):
         _check_header(folder, case)
-        stored_rows = {key: _read(folder, key) for key in every}
+        stored_rows = {key: _read(folder, key) for key in cases_by_key}
         result_names = [
             key
             for key, row in stored_rows.items()
             if row is None or (is_retry and bool(row["kind"]))
         ]
-        _run_through_deaths(folder, case, every, result_names, count, client)
-    study = Study(folder, tuple(_stored_case(folder, key) for key in every))
+        _run_through_deaths(folder, case, cases_by_key, result_names, count, client)
+    study = Study(folder, tuple(_stored_case(folder, key) for key in cases_by_key))
     if study.failed:
         first = study.failed[0]
         warn(
@@ -499,7 +499,7 @@ def grid(**parameters: Iterable[Any]) -> list[dict[str, Any]]:
     lists = {}
     for name, values in parameters.items():
         lists[name] = _list_of(values, f"grid: {name}", "a list of values")
-    return [dict(zip(lists, each)) for each in product(*lists.values())]
+    return [dict(zip(lists, combination)) for combination in product(*lists.values())]
 
 
 def _list_of(values: Any, what: str, expectation: str) -> list[Any]:
@@ -515,7 +515,7 @@ def _list_of(values: Any, what: str, expectation: str) -> list[Any]:
 def _run_through_deaths(
     folder: Path,
     case: Callable[..., Any],
-    every: Mapping[str, dict[str, Any]],
+    cases: Mapping[str, dict[str, Any]],
     names: list[str],
     workers: int,
     client: Any,
@@ -530,7 +530,7 @@ def _run_through_deaths(
         finished_keys: set[str] = set()
         try:
             with engine_of(workers, client) as engine:
-                _run(folder, case, every, remaining_names, engine, finished_keys)
+                _run(folder, case, cases, remaining_names, engine, finished_keys)
             return
         except WorkerDeathError:
             if client is not None:
@@ -538,7 +538,7 @@ def _run_through_deaths(
         remaining_names = [key for key in remaining_names if key not in finished_keys]
         suspects = remaining_names[: 2 * workers + 1]  # under way, and handed out
         for key in suspects:
-            _run_alone(folder, case, key, every[key])
+            _run_alone(folder, case, key, cases[key])
         remaining_names = remaining_names[len(suspects) :]
 
 
@@ -565,30 +565,30 @@ _DEATH = (
 def _run(
     folder: Path,
     case: Callable[..., Any],
-    every: Mapping[str, dict[str, Any]],
+    cases: Mapping[str, dict[str, Any]],
     names: list[str],
     engine: Engine,
     finished_keys: set[str],
 ) -> None:
     """Run the cases; each is stored as soon as it is finished, in whatever order."""
     first, remaining_names = names[0], names[1:]
-    _finish(engine, folder, first, every[first], submit_case(engine, every[first], case))
+    _finish(engine, folder, first, cases[first], submit_case(engine, cases[first], case))
     finished_keys.add(first)
     futures: dict[str, Any] = {}
     try:
         for key in remaining_names:
-            futures[key] = submit_case(engine, every[key], case)
+            futures[key] = submit_case(engine, cases[key], case)
         for key in finished_names(engine, futures):
-            _finish(engine, folder, key, every[key], futures[key])
+            _finish(engine, folder, key, cases[key], futures[key])
             finished_keys.add(key)
     except BaseException:
-        _store_finished(folder, every, engine, futures, finished_keys)
+        _store_finished(folder, cases, engine, futures, finished_keys)
         raise
 
 
 def _store_finished(
     folder: Path,
-    every: Mapping[str, dict[str, Any]],
+    cases: Mapping[str, dict[str, Any]],
     engine: Engine,
     futures: Mapping[str, Any],
     finished_keys: set[str],
@@ -598,7 +598,7 @@ def _store_finished(
         return
     for key, future in futures.items():
         if is_good(future) and key not in finished_keys:
-            _finish(engine, folder, key, every[key], future)
+            _finish(engine, folder, key, cases[key], future)
             finished_keys.add(key)
         call_off(future)
 

@@ -389,8 +389,8 @@ def _move_aside(
     files = [*stored_steps.rest, *([] if damaged_file is None else [damaged_file])]
     new_folder = run_folder.move_aside(folder, files)
     if stored_steps.rest:
-        last = len(stored_steps.steps) - 1
-        begin = f"growth goes on from step {last}" if stored_steps.steps else "growth begins anew"
+        index = len(stored_steps.steps) - 1
+        begin = f"growth goes on from step {index}" if stored_steps.steps else "growth begins anew"
         warn(
             f"{stored_steps.fault} in {folder}: {begin}; {len(stored_steps.rest)} files of steps "
             f"were moved to {new_folder}."

@@ -397,10 +397,10 @@ class History:
         rows, mesh = self.table(), self.mesh
         tables = {"history": rows}
         if mesh is not None:
-            every = measures_of_steps(self.steps, mesh)
-            tables["history"] = with_measures(rows, every, mesh)
-            tables["measures"], tables["ends"] = measures_tables(every, mesh)
-        texts = {folder / f"{name}.csv": _csv_text(each) for name, each in tables.items()}
+            step_measures = measures_of_steps(self.steps, mesh)
+            tables["history"] = with_measures(rows, step_measures, mesh)
+            tables["measures"], tables["ends"] = measures_tables(step_measures, mesh)
+        texts = {folder / f"{name}.csv": _csv_text(part) for name, part in tables.items()}
         what = "the history cannot be written as a whole to"
         with system_errors(what, folder, error=ProblemError):
             folder.mkdir(parents=True, exist_ok=True)

@@ -134,10 +134,10 @@ class GrowthCurve:
         if N >= self.N[-1]:
             return float(self.a[-1])
         i = int(np.searchsorted(self.N, N, side="right") - 1)
-        low, high = self.a[i], self.a[i + 1]
-        if low == high:
-            return float(low)
-        return float(brentq(lambda a: self.cycles_at(a) - N, low, high, xtol=1e-13 * high))
+        a_begin, a_end = self.a[i], self.a[i + 1]
+        if a_begin == a_end:
+            return float(a_begin)
+        return float(brentq(lambda a: self.cycles_at(a) - N, a_begin, a_end, xtol=1e-13 * a_end))
 
 
 def growth_curve(
@@ -311,15 +311,15 @@ def _line_of(
         for numbers_there in numbers_of_pairs:
             line.append(numbers_there[line[-1]])
         return line
-    last = max(n for n, step in enumerate(steps) if n == 0 or not step.has_left)
-    rate = [float(of_crack.max(initial=0)) for of_crack in steps[last].law_rate]
-    line = [max(range(len(rate)), key=lambda c: (rate[c], _length_or_zero(values[last][c])))]
+    last_row = max(n for n, step in enumerate(steps) if n == 0 or not step.has_left)
+    rate = [float(of_crack.max(initial=0)) for of_crack in steps[last_row].law_rate]
+    line = [max(range(len(rate)), key=lambda c: (rate[c], _length_or_zero(values[last_row][c])))]
     for numbers_there, sizes in zip(
-        numbers_of_pairs[:last][::-1], values[:last][::-1], strict=True
+        numbers_of_pairs[:last_row][::-1], values[:last_row][::-1], strict=True
     ):
         joined_cracks = [c for c, number in enumerate(numbers_there) if number == line[0]]
         line.insert(0, max(joined_cracks, key=lambda c: _length_or_zero(sizes[c])))
-    for numbers_there in numbers_of_pairs[last:]:
+    for numbers_there in numbers_of_pairs[last_row:]:
         line.append(numbers_there[line[-1]])
     return line
 
@@ -377,39 +377,39 @@ def inspection(
         raise ProblemError(f"inspection: curve = {value_text(curve)}: give a History.")
     if (a_detect is None) == (interval is None):
         raise ProblemError("inspection: give a_detect or interval, and not both.")
-    low, high = float(curve.a[0]), float(curve.a[-1])
-    end = high if a_critical is None else number(a_critical, "inspection: a_critical", above=low)
-    if end > high * (1 + 1e-12):
+    a0, a1 = float(curve.a[0]), float(curve.a[-1])
+    end = a1 if a_critical is None else number(a_critical, "inspection: a_critical", above=a0)
+    if end > a1 * (1 + 1e-12):
         raise ProblemError(
-            f"inspection: a_critical = {end:.6g} is beyond the last length of the run, {high:.6g}: "
+            f"inspection: a_critical = {end:.6g} is beyond the last length of the run, {a1:.6g}: "
             "give at most that."
         )
-    begin, last = float(curve.N[0]), curve.cycles_at(end)
+    begin, stop = float(curve.N[0]), curve.cycles_at(end)
     if a_detect is not None:
-        if not low <= a_detect < end:
+        if not a0 <= a_detect < end:
             raise ProblemError(
                 f"inspection: a_detect = {a_detect:.6g} is no length of the run: give one "
-                f"from {low:.6g} to below {end:.6g}."
+                f"from {a0:.6g} to below {end:.6g}."
             )
-        every = (last - curve.cycles_at(a_detect)) / factor
-        first = begin + (last - begin) / 2
+        step = (stop - curve.cycles_at(a_detect)) / factor
+        first = begin + (stop - begin) / 2
     else:
         assert interval is not None  # one of the two
-        every = interval
-        first = begin + every
-    if (last - first) / every > _MOST_LOOKS:
+        step = interval
+        first = begin + step
+    if (stop - first) / step > _MOST_LOOKS:
         raise ProblemError(
-            f"inspection: {every:.6g} cycles between looks are {(last - first) / every:.3g} looks: "
+            f"inspection: {step:.6g} cycles between looks are {(stop - first) / step:.3g} looks: "
             "give a longer interval."
         )
-    at = np.arange(first, last, every)
+    at = np.arange(first, stop, step)
     a = np.array([curve.length_at(N) for N in at])
     probability_missed = (
         None
         if pod is None
-        else float(np.prod([1 - _detection_probability(pod, each) for each in a]))
+        else float(np.prod([1 - _detection_probability(pod, length) for length in a]))
     )
-    return Inspection(first, every, at, a, probability_missed, curve.measure)
+    return Inspection(first, step, at, a, probability_missed, curve.measure)
 
 
 def _detection_probability(pod: Any, a: float) -> float:

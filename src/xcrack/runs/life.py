@@ -111,10 +111,10 @@ class Life:
         return draw_life(self, kind, file)
 
     def __str__(self) -> str:
-        low, middle, high = (self.percentile(p) for p in (5, 50, 95))
+        N_5, N_50, N_95 = (self.percentile(p) for p in (5, 50, 95))
         lines = [
-            f"life {self.life:.4g} {self.unit}s; median {middle:.4g}, 90 % of {len(self.N)} "
-            f"samples from {low:.4g} to {high:.4g}"
+            f"life {self.life:.4g} {self.unit}s; median {N_50:.4g}, 90 % of {len(self.N)} "
+            f"samples from {N_5:.4g} to {N_95:.4g}"
         ]
         for name, (least_life, largest_life) in self.scatter.items():
             lines.append(f"  {name} alone: from {least_life:.4g} to {largest_life:.4g}")
@@ -328,8 +328,8 @@ def _rows(
 
 
 def _is_proportional(history: History, block: SpectrumBlock) -> bool:
-    chosen = block.spectrum.states is not None or block.spectrum.levels != "auto"
-    return not block.spectrum.steady and (chosen or len(history.steps[0].levels) <= 2)
+    has_own_levels = block.spectrum.states is not None or block.spectrum.levels != "auto"
+    return not block.spectrum.steady and (has_own_levels or len(history.steps[0].levels) <= 2)
 
 
 def _checked_sizes(lead: DrivingForce, sizes: Floats) -> Floats:
@@ -349,8 +349,8 @@ def _checked_sizes(lead: DrivingForce, sizes: Floats) -> Floats:
 
 
 def _ends(N: Floats) -> tuple[float, float]:
-    low, high = np.quantile(N, _ENDS, method="inverted_cdf")
-    return float(low), float(high)
+    lower_quantile, upper_quantile = np.quantile(N, _ENDS, method="inverted_cdf")
+    return float(lower_quantile), float(upper_quantile)
 
 
 def _of_steps(lead: DrivingForce) -> float:

@@ -77,24 +77,24 @@ class LifeBar:
 def life_bar(steps: Sequence[Step]) -> LifeBar:
     """Error bar of the life of a run."""
     nan = float("nan")
-    every = [sif for step in steps for sif in (step.sif[0] if step.sif else ())]
+    sifs = [sif for step in steps for sif in (step.sif[0] if step.sif else ())]
     states = [state for step in steps for state in zip(*step.sif)]
     best_flags = [np.all([sif.has_best for sif in crack], axis=0) for crack in states]
     best = sum(int(np.count_nonzero(flags_of_crack)) for flags_of_crack in best_flags)
-    places = sum(len(sif.K) for sif in every)
+    places = sum(len(sif.K) for sif in sifs)
     texts = [
         reason for step in steps for state in step.sif for sif in state
         if sif.errors is not None for reason in sif.reasons if reason
     ]  # fmt: skip
     # One of each kind: they may differ in their numbers alone.
     reasons = {_NUMBER.sub("#", reason): reason for reason in reversed(texts)}
-    last = steps[-1] if steps else None
-    error = None if last is None else last.error
-    if last is None or error is None:
-        life = 0.0 if last is None else last.cycles
+    last_step = steps[-1] if steps else None
+    error = None if last_step is None else last_step.error
+    if last_step is None or error is None:
+        life = 0.0 if last_step is None else last_step.cycles
         return LifeBar(life, nan, nan, nan, nan, nan, best, places, ())
     return LifeBar(
-        last.cycles,
+        last_step.cycles,
         error.cycles,
         error.K,
         error.contact,

@@ -65,17 +65,17 @@ def _take(path: Path, owner: dict[str, Any]) -> None:
     for _ in range(_TRIES):
         if _create_lock(path, owner):
             return
-        other = _read(path)
-        if other is None and not path.exists():
+        holder = _read(path)
+        if holder is None and not path.exists():
             continue  # it was given back meanwhile
-        if other is None:
+        if holder is None:
             raise ProblemError(
                 f"{path} is no lock that xcrack can read: delete it if no run writes to "
                 f"{path.parent}."
             )
-        if _may_live(other):
-            raise ProblemError(_in_use(path, other))
-        _remove(path, other)
+        if _may_live(holder):
+            raise ProblemError(_in_use(path, holder))
+        _remove(path, holder)
     raise ProblemError(f"{path}: other processes take and leave the lock all the time; try again.")
 
 

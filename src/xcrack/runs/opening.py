@@ -79,20 +79,20 @@ def _of_crack(levels: Floats, K: Floats) -> tuple[Floats, Floats, Floats]:
         is_closed = K[:, place] <= _CLOSED * np.abs(K[:, place]).max(initial=0.0)
         if is_closed.all():
             continue
-        last = int(np.nonzero(is_closed)[0].max()) if is_closed.any() else -1
-        if last < 0:
+        last_closed = int(np.nonzero(is_closed)[0].max()) if is_closed.any() else -1
+        if last_closed < 0:
             level[place] = levels[0]
-        elif last == n - 1:
+        elif last_closed == n - 1:
             continue  # closes under the largest load
         else:
-            level[place] = levels[last]
-            level_gap[place] = levels[last + 1] - levels[last]
-            if last + 2 < n:
-                low, high = K[last + 1, place], K[last + 2, place]
-                slope = (high - low) / (levels[last + 2] - levels[last + 1])
+            level[place] = levels[last_closed]
+            level_gap[place] = levels[last_closed + 1] - levels[last_closed]
+            if last_closed + 2 < n:
+                K_lower, K_upper = K[last_closed + 1, place], K[last_closed + 2, place]
+                slope = (K_upper - K_lower) / (levels[last_closed + 2] - levels[last_closed + 1])
                 if slope > 0:
-                    level[place] = max(level[place], levels[last + 1] - low / slope)
-            elif levels[last] < 0 < levels[-1]:
+                    level[place] = max(level[place], levels[last_closed + 1] - K_lower / slope)
+            elif levels[last_closed] < 0 < levels[-1]:
                 level[place] = 0.0  # two levels: K is in proportion to the factor
     share = (levels[-1] - level) / (levels[-1] - levels[0])
     return level, np.nan_to_num(share), level_gap

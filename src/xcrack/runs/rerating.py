@@ -80,8 +80,8 @@ class SpectrumBlock:
             levels = np.array([levels[0], 0.0, levels[1]])
             return LevelTable(levels, np.stack([K[0], np.zeros_like(K[0]), K[1]]), is_smooth=False)
         if self.is_thinned and len(levels) > 2:
-            chosen = np.unique([*range(0, len(levels), 2), len(levels) - 1])
-            levels, K = levels[chosen], K[chosen]
+            rows = np.unique([*range(0, len(levels), 2), len(levels) - 1])
+            levels, K = levels[rows], K[rows]
         return LevelTable(levels, K, is_smooth=len(levels) > 2)
 
     def check(self, step: Step, what: str) -> None:
@@ -95,13 +95,13 @@ class SpectrumBlock:
         if spectrum.states is not None:
             has_levels = not step.levels and len(spectrum.states) == len(step.sif)
         else:
-            low, high = spectrum.extremes
-            size = _NEAR * max(abs(low), abs(high))
+            min_level, max_level = spectrum.extremes
+            size = _NEAR * max(abs(min_level), abs(max_level))
             has_levels = bool(step.levels) and len(step.levels) == len(step.sif)
             has_levels = (
                 has_levels
-                and abs(step.levels[0] - low) <= size
-                and abs(step.levels[-1] - high) <= size
+                and abs(step.levels[0] - min_level) <= size
+                and abs(step.levels[-1] - max_level) <= size
             )
         if not has_levels:
             raise ProblemError(
@@ -262,13 +262,13 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
     index, crack, place, is_driving, da, flags = table[:, :6].T
     pairs = table[:, 6:].reshape(len(table), 2, 6)
     a, dK, R, rate, size, spread = np.moveaxis(pairs, 2, 0)
-    step, where = index.astype(np.int64), np.stack([crack, place, flags], axis=1).astype(np.int64)
-    one = (dK[..., None], R[..., None], np.ones((*dK.shape, 1)))
-    ranges, ratios, count = one if block is None else _of_blocks(steps, block, step, where)
+    step, places = index.astype(np.int64), np.stack([crack, place, flags], axis=1).astype(np.int64)
+    cycle = (dK[..., None], R[..., None], np.ones((*dK.shape, 1)))
+    ranges, ratios, count = cycle if block is None else _of_blocks(steps, block, step, places)
     return DrivingForce(
         step=step,
         is_driving=is_driving.astype(bool),
-        place=where[:, :2],
+        place=places[:, :2],
         da=da,
         a=a,
         rate=rate,
@@ -277,13 +277,13 @@ def driving_forces(steps: Sequence[Step], block: SpectrumBlock | None = None) ->
         dK=ranges,
         R=ratios,
         count=count,
-        cycles=np.diff([each.cycles for each in steps]),
+        cycles=np.diff([s.cycles for s in steps]),
         threshold=0.0 if block is None else block.threshold,
     )
 
 
 def _of_blocks(
-    steps: Sequence[Step], block: SpectrumBlock, step: Ints, where: Ints
+    steps: Sequence[Step], block: SpectrumBlock, step: Ints, places: Ints
 ) -> tuple[Floats, Floats, Floats]:
     """Range, ratio and count of all cycles of a block at both ends of each row `(k, 2, p)`."""
     answers: dict[tuple[int, int], tuple[Floats, Floats, Floats]] = {}
@@ -294,7 +294,7 @@ def _of_blocks(
         return tuple(part[:, j] for part in answers[n, c])
 
     rows = []
-    for n, (c, j, next_place) in zip(step.tolist(), where.tolist()):
+    for n, (c, j, next_place) in zip(step.tolist(), places.tolist()):
         first = at(n, c, j)
         next_number = _numbers(steps[n], steps[n + 1])[c]
         rows += [first, first if next_place < 0 else at(n + 1, next_number, next_place)]
@@ -326,15 +326,15 @@ def _of_step(number: int, step: Step, next_step: Step) -> list[tuple[float, ...]
             first = _values(step, c, j, a, step.sizes[c])
             distance, k = cKDTree(next_x).query(moved_x[j]) if len(next_x) else (np.inf, 0)
             if distance <= _NEAR_ADVANCE * da[j] and c not in joined_cracks:
-                last = _values(
+                last_values = _values(
                     next_step, next_number, int(k), a + da[j], next_step.sizes[next_number]
                 )
             else:  # it has left the body, or joined another crack: its rate stays what it was
                 way = ligament.get((c, j), way)
-                k, last = -1, (a + way, *first[1:])
-            rows.append((number, c, j, float(rate[j]), way, int(k), *first, *last))
-    best = max((row[3] for row in rows), default=0.0)
-    first_best = next((k for k, row in enumerate(rows) if row[3] == best), -1)
+                k, last_values = -1, (a + way, *first[1:])
+            rows.append((number, c, j, float(rate[j]), way, int(k), *first, *last_values))
+    best_rate = max((row[3] for row in rows), default=0.0)
+    first_best = next((k for k, row in enumerate(rows) if row[3] == best_rate), -1)
     return [(*row[:3], float(k == first_best), *row[4:]) for k, row in enumerate(rows)]
 
 
@@ -343,18 +343,18 @@ def _values(step: Step, c: int, j: int, a: float, length: float) -> tuple[float,
     tips = 1 if step.cracks[c].fronts is not None else max(len(step.da[c]), 1)
     K = np.stack([state[c].K[j] for state in step.sif])
     spread = np.stack([state[c].spread[j] for state in step.sif])
-    largest = int(np.argmax(np.abs(K).max(axis=1)))
-    share = spread[largest].max() / max(np.abs(K[largest]).max(), np.finfo(float).tiny)
+    largest_state = int(np.argmax(np.abs(K).max(axis=1)))
+    share = spread[largest_state].max() / max(np.abs(K[largest_state]).max(), np.finfo(float).tiny)
     dK, R, rate = (x[c][j] for x in (step.dK_eq, step.R, step.law_rate))
     return float(a), float(dK), float(R), float(rate), length / tips, float(share)
 
 
 def cycles_of(a: Floats, rate: Floats) -> Floats:
     """Cycles from a[..., 0] to a[..., 1]; inf where nothing grows, 0 beyond the toughness."""
-    first, last = rate[..., 0], rate[..., 1]
+    first, last_rate = rate[..., 0], rate[..., 1]
     is_growing = (first > 0) & np.isfinite(first)
     safe_rate = np.where(is_growing, first, 1.0)
-    cycles = cycles_between(a[..., 0], a[..., 1], safe_rate, np.where(is_growing, last, 1.0))
+    cycles = cycles_between(a[..., 0], a[..., 1], safe_rate, np.where(is_growing, last_rate, 1.0))
     return np.where(is_growing, cycles, np.where(first > 0, 0.0, np.inf))
 
 
@@ -411,9 +411,9 @@ def load_program_of(load: Curve | None, K_max: Curve | LoadProgram | None) -> Lo
 def _factors(program: LoadProgram, rows: DrivingForce) -> Floats:
     """Factor on the loads before and after each step that grows `(n, 2)`."""
     lead = rows.lead
-    largest = np.where(lead.count > 0, lead.dK / (1.0 - lead.R), 0.0).max(axis=2)
+    largest_K = np.where(lead.count > 0, lead.dK / (1.0 - lead.R), 0.0).max(axis=2)
     a = lead.size
-    values = program.factors(a.ravel(), np.full(a.size, np.nan), largest.ravel())
+    values = program.factors(a.ravel(), np.full(a.size, np.nan), largest_K.ravel())
     return np.broadcast_to(values, a.size).reshape(a.shape)
 
 
@@ -500,9 +500,9 @@ def recompute_rates(
     is_broken = np.isinf(rate[first]).any(axis=1)
     end = ""
     if is_broken.any():
-        last = int(np.argmax(is_broken))
-        new_cycles = new_cycles[: last + 1]
-        end = f"the law returns inf in step {last}: its toughness is reached"
+        end_row = int(np.argmax(is_broken))
+        new_cycles = new_cycles[: end_row + 1]
+        end = f"the law returns inf in step {end_row}: its toughness is reached"
     bound = bound_of_shares(rows, rate[:, 0], new_cycles)
     if bound > _MOST:
         raise ProblemError(

@@ -159,8 +159,8 @@ class CycledPath:
             _ends(rows, row, (history.steps[n], history.steps[n + 1]), values, spectrum, nu)
             for row, n in enumerate(rows.step.tolist())
         ]
-        a, size = (np.append(each[:, 0], each[-1:, 1]) for each in (rows.a, rows.size))
-        K = np.stack([ends[0][0], *(each[1] for each in ends)])
+        a, size = (np.append(column[:, 0], column[-1:, 1]) for column in (rows.a, rows.size))
+        K = np.stack([ends[0][0], *(pair[1] for pair in ends)])
         return cls(rows, a, size, K, order, threshold)
 
     def grown_by(
@@ -207,9 +207,9 @@ class CycledPath:
         return solves[is_finite[: len(solves)]], cycles.rows(is_finite)
 
     def _cycles(self, solves: Ints, factor: float) -> BlockCycles:
-        low, high = np.moveaxis(self.K[solves] * factor, -1, 0)
-        R = np.divide(low, high, out=np.zeros_like(high), where=high > 0)
-        return BlockCycles((high - low)[:, None], R[:, None], self.size[solves][:, None])
+        K_min, K_max = np.moveaxis(self.K[solves] * factor, -1, 0)
+        R = np.divide(K_min, K_max, out=np.zeros_like(K_max), where=K_max > 0)
+        return BlockCycles((K_max - K_min)[:, None], R[:, None], self.size[solves][:, None])
 
 
 def check(history: object, law: object, spectrum: object, model: object) -> None:

@@ -77,8 +77,8 @@ class StoredSteps:
 
 def folder_of_steps(folder: Path) -> Path:
     """The folder itself, or the one in it where a case file has its steps."""
-    inner = folder / STEPS
-    return inner if inner.is_dir() and not (folder / HEADER).is_file() else folder
+    steps_folder = folder / STEPS
+    return steps_folder if steps_folder.is_dir() and not (folder / HEADER).is_file() else folder
 
 
 def write_header(folder: Path, header: RunHeader) -> None:

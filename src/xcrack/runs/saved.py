@@ -168,8 +168,8 @@ def _history_of(arrays: Arrays, path: Path) -> History:
 
     try:
         settings = json.loads(str(arrays["settings"]))
-        every = [part(f"{k:05d}_") for k in range(int(arrays["n_steps"]))]
-        steps = tuple(step_of(each, settings) for each in every)
+        arrays_of_steps = [part(f"{k:05d}_") for k in range(int(arrays["n_steps"]))]
+        steps = tuple(step_of(arrays_of_step, settings) for arrays_of_step in arrays_of_steps)
         mesh = mesh_of(part("mesh_")) if "mesh_points" in arrays else None
         return History(steps, str(arrays["ended"]), None, mesh)
     except (KeyError, ValueError, IndexError) as error:
@@ -227,12 +227,12 @@ def _stored_material(problem: Problem) -> Material:
     if elasticity.node_moduli is None:
         return elasticity.material
     stored_materials = {}
-    for k, (name, one) in enumerate(elasticity.named):
+    for k, (name, material) in enumerate(elasticity.named):
         cells = np.arange(len(mesh.cells))
         cells = cells[elasticity.set_number == k] if len(elasticity.set_number) else cells
         values = np.full(mesh.n_points + len(mesh.edges), np.nan)
         values[mesh.corners_and_edges[cells]] = elasticity.node_moduli[cells]
-        stored_materials[name] = one.stored(lock(values))
+        stored_materials[name] = material.stored(lock(values))
     return stored_materials[""] if "" in stored_materials else MaterialSets(stored_materials)
 
 

@@ -158,8 +158,8 @@ class Scatter:
                     f"the law; C, K, load and a0 are arguments of their own."
                 )
         object.__setattr__(self, "constants", dict(self.constants))
-        every = {name: getattr(self, name) for name in _OWN} | dict(self.constants)
-        for name, part in every.items():
+        parts_by_name = {name: getattr(self, name) for name in _OWN} | dict(self.constants)
+        for name, part in parts_by_name.items():
             is_needed = name in self.constants or part is not None
             if is_needed and not isinstance(part, Distribution):
                 raise ProblemError(
@@ -209,8 +209,8 @@ class Scatter:
         """Correlations of all parts `(n, n)`, in their order."""
         names = list(self.parts)
         result = np.eye(len(names))
-        for (one, other), rho in self.correlation.items():
-            i, j = names.index(one), names.index(other)
+        for (p, q), rho in self.correlation.items():
+            i, j = names.index(p), names.index(q)
             result[i, j] = result[j, i] = rho
         return result
 
@@ -325,8 +325,8 @@ def _law_with_factor(part: Any, names: list[str], factor: float, whole_name: str
     has_constant = is_dataclass(part) and names[0] in {field.name for field in fields(part)}
     value = getattr(part, names[0]) if has_constant else None
     if has_constant and len(names) > 1:
-        inner = _law_with_factor(value, names[1:], factor, whole_name, law)
-        return replace(part, **{names[0]: inner})
+        changed_part = _law_with_factor(value, names[1:], factor, whole_name, law)
+        return replace(part, **{names[0]: changed_part})
     if not has_constant or isinstance(value, bool) or not isinstance(value, int | float):
         constant_names: list[str] = []
         if is_dataclass(law):
@@ -397,8 +397,8 @@ class _Tabulated:
     def __init__(self, lead: DrivingForce, law: Law, stretch: Floats) -> None:
         self.log = np.log(stretch)
         self.work = lead.size.size
-        low, high = float(self.log.min()), float(self.log.max())
-        self.nodes = np.linspace(low, high, _NODES) if low < high else np.array([low])
+        x_min, x_max = float(self.log.min()), float(self.log.max())
+        self.nodes = np.linspace(x_min, x_max, _NODES) if x_min < x_max else np.array([x_min])
         self.table = np.stack([lead.rates(law, float(np.exp(node))) for node in self.nodes])
 
     def of(self, part: slice) -> Floats:
@@ -408,11 +408,11 @@ class _Tabulated:
         at = at / (self.nodes[1] - self.nodes[0])
         node = np.clip(at.astype(np.int64), 0, len(self.nodes) - 2)
         share = (at - node)[:, None, None]
-        low, high = self.table[node], self.table[node + 1]
-        has_rates = (low > 0) & np.isfinite(high) & (high > 0)
+        r0, r1 = self.table[node], self.table[node + 1]
+        has_rates = (r0 > 0) & np.isfinite(r1) & (r1 > 0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            power = low * (high / low) ** share
-            line = np.where(np.isinf(high), np.where(share > 0, np.inf, low), low + share * high)
+            power = r0 * (r1 / r0) ** share
+            line = np.where(np.isinf(r1), np.where(share > 0, np.inf, r0), r0 + share * r1)
         return np.asarray(np.where(has_rates, power, line))
 
 
@@ -437,8 +437,8 @@ def _steps_from_size(a: Floats, rate: Floats, size: Floats) -> tuple[Floats, Flo
         power = np.log(rate[..., 1] / rate[..., 0]) / np.log(a[..., 1] / a[..., 0])
         begin = rate[..., 0] * (first / a[..., 0]) ** power
     begin = np.where(np.isfinite(begin), begin, rate[..., 0])
-    begin, end, last = np.broadcast_arrays(begin, rate[..., 1], a[..., 1])
-    return np.stack([first, last], axis=-1), np.stack([begin, end], axis=-1)
+    begin, end, a_end = np.broadcast_arrays(begin, rate[..., 1], a[..., 1])
+    return np.stack([first, a_end], axis=-1), np.stack([begin, end], axis=-1)
 
 
 __all__ = ["Distribution", "Scatter", "lives", "lognormal", "normal", "stretch_of", "varied_law"]

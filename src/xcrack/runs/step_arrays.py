@@ -154,11 +154,11 @@ def unpack_cracks(prefix: str, arrays: Arrays) -> tuple[Crack, ...]:
     points, faces, ends = (arrays[f"{prefix}_{name}"] for name in ("points", "faces", "ends"))
     counts = [arrays[f"{prefix}_{name}"].tolist() for name in ("point_count", "face_count")]
     cut_points, cut_faces = (np.cumsum([0, *count]) for count in counts)
-    every = np.split(ends, np.cumsum(arrays[f"{prefix}_end_length"])[:-1]) if len(ends) else []
+    all_ends = np.split(ends, np.cumsum(arrays[f"{prefix}_end_length"])[:-1]) if len(ends) else []
     arms = arrays.get(f"{prefix}_arms", np.zeros((0, 3), dtype=np.int64))
     result, first = [], 0
     for c, count in enumerate(arrays[f"{prefix}_end_count"].tolist()):
-        rows = every[first : first + max(count, 0)]
+        rows = all_ends[first : first + max(count, 0)]
         first += max(count, 0)
         part = slice(cut_points[c], cut_points[c + 1])
         sides = faces[cut_faces[c] : cut_faces[c + 1]]
@@ -186,8 +186,8 @@ def _whole_numbers(*parts: NDArray[Any]) -> Ints:
 def _pack_sif(states: Sequence[Sequence[SIF]]) -> Arrays:
     first = states[0]
     for state in states[1:]:
-        for one, other in zip(first, state, strict=True):
-            if not all(np.array_equal(getattr(one, n), getattr(other, n)) for n in _OF_PLACES):
+        for a, b in zip(first, state, strict=True):
+            if not all(np.array_equal(getattr(a, n), getattr(b, n)) for n in _OF_PLACES):
                 raise ProblemError(
                     "K of the load states of a step belongs to different places, and cannot be "
                     "stored: a response has the stations of its problem in each state."
@@ -196,30 +196,30 @@ def _pack_sif(states: Sequence[Sequence[SIF]]) -> Arrays:
     result: Arrays = {"crack": np.repeat(np.arange(len(first)), count)}
     result |= {n: np.concatenate([getattr(sif, n) for sif in first]) for n in _OF_PLACES}
     result |= {name: at_stations(states, name) for name in _OF_STATES}
-    every = [[sif for sif in state] for state in states]
-    if any(sif.widened is not None for state in every for sif in state):
-        result["has_widened"] = np.array([[s.widened is not None for s in row] for row in every])
-        result["widened"] = _or_nan(every, lambda sif: sif.widened)
-    if any(sif.E_prime is not None for state in every for sif in state):
-        result["has_moduli"] = np.array([[s.E_prime is not None for s in row] for row in every])
+    sifs = [[sif for sif in state] for state in states]
+    if any(sif.widened is not None for state in sifs for sif in state):
+        result["has_widened"] = np.array([[s.widened is not None for s in row] for row in sifs])
+        result["widened"] = _or_nan(sifs, lambda sif: sif.widened)
+    if any(sif.E_prime is not None for state in sifs for sif in state):
+        result["has_moduli"] = np.array([[s.E_prime is not None for s in row] for row in sifs])
         for name in ("E_prime", "nu"):
-            rows = [[_or_nan_row(sif, getattr(sif, name)) for sif in row] for row in every]
+            rows = [[_or_nan_row(sif, getattr(sif, name)) for sif in row] for row in sifs]
             result[name] = np.stack([np.concatenate(row) for row in rows])
-    if any(sif.errors is not None for state in every for sif in state):
-        result["has_bar"] = np.array([[s.errors is not None for s in row] for row in every])
+    if any(sif.errors is not None for state in sifs for sif in state):
+        result["has_bar"] = np.array([[s.errors is not None for s in row] for row in sifs])
         result["has_contact_bar"] = np.array(
-            [[s.errors is not None and s.errors.contact is not None for s in r] for r in every]
+            [[s.errors is not None and s.errors.contact is not None for s in r] for r in sifs]
         )
-        result["eta"] = _or_nan(every, lambda sif: sif.errors and sif.errors.eta)
-        result["bar"] = _or_nan(every, lambda sif: sif.errors and sif.errors.bar)
-        result["contact_bar"] = _or_nan(every, lambda sif: sif.errors and sif.errors.contact)
+        result["eta"] = _or_nan(sifs, lambda sif: sif.errors and sif.errors.eta)
+        result["bar"] = _or_nan(sifs, lambda sif: sif.errors and sif.errors.bar)
+        result["contact_bar"] = _or_nan(sifs, lambda sif: sif.errors and sif.errors.contact)
         reasons = [
             [r for sif in row for r in (sif.errors.reasons if sif.errors else [""] * len(sif.x))]
-            for row in every
+            for row in sifs
         ]
         result["bar_reason"] = np.array(reasons, dtype=str).reshape(len(states), -1)
     corners = [
-        (k, c, end) for k, row in enumerate(every) for c, sif in enumerate(row) for end in sif.ends
+        (k, c, end) for k, row in enumerate(sifs) for c, sif in enumerate(row) for end in sif.ends
     ]
     if corners:
         result["corner_state"] = np.array([k for k, _, _ in corners])
@@ -232,10 +232,10 @@ def _or_nan_row(sif: SIF, value: Floats | None) -> Floats:
     return np.full(len(sif.x), np.nan) if value is None else value
 
 
-def _or_nan(every: Sequence[Sequence[SIF]], part: Any) -> Floats:
+def _or_nan(sifs: Sequence[Sequence[SIF]], part: Any) -> Floats:
     """Values of all states and stations `(s, n, m)`, nan where a SIF has none."""
     rows = []
-    for row in every:
+    for row in sifs:
         values = [part(sif) for sif in row]
         columns = [
             np.full_like(sif.K, np.nan) if value is None else value

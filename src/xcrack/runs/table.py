@@ -70,11 +70,11 @@ def table(steps: Sequence[Step]) -> Table:
 
 def state_names(steps: Sequence[Step]) -> list[str]:
     """Names of all load states of some steps, in the order of their loads."""
-    every = {name for step in steps for name in step.states}
-    numbers = sorted((name for name in every if name.isdigit()), key=int)
+    all_names = {name for step in steps for name in step.states}
+    numbers = sorted((name for name in all_names if name.isdigit()), key=int)
     words = [name for step in steps for name in step.states if not name.isdigit()]
     other_names = [name for name in dict.fromkeys(words) if name not in ("min", "max")]
-    ends = [[name] if name in every else [] for name in ("min", "max")]
+    ends = [[name] if name in all_names else [] for name in ("min", "max")]
     return [*ends[0], *numbers, *other_names, *ends[1]]
 
 
@@ -149,10 +149,10 @@ def _rows_at_end(step: Step, n_columns: int, *, with_size: bool) -> list[tuple[A
     if not step.has_left:
         return []
     rows = []
-    for each in step.arrivals:
-        size = _size(step, each.crack) if with_size else np.nan
-        number = each.tip if with_size else 0
-        row = (step.index, step.cycles, each.crack, number, each.end, *each.x, size)
+    for arrival in step.arrivals:
+        size = _size(step, arrival.crack) if with_size else np.nan
+        number = arrival.tip if with_size else 0
+        row = (step.index, step.cycles, arrival.crack, number, arrival.end, *arrival.x, size)
         rows.append((*row, *[np.nan] * (n_columns - len(row))))
     return rows
 
@@ -163,11 +163,11 @@ def _rows_3d(step: Step, states: Sequence[str], columns: Columns) -> list[tuple[
         if not step.sif:
             continue
         sif = step.sif[0][c]
-        every = [*_K_of_states(step, states, c, 3), *(of(step, c) for of in columns.values())]
+        parts = [*_K_of_states(step, states, c, 3), *(of(step, c) for of in columns.values())]
         for number in np.unique(sif.front).tolist():
             places = np.nonzero(sif.front == number)[0]
             weight = front_weights(sif.x[places])
-            ends = [end for values in every for end in _extremes_and_mean(values[places], weight)]
+            ends = [end for values in parts for end in _extremes_and_mean(values[places], weight)]
             middle, size, end = weight @ sif.x[places], _size(step, c), end_id(step, c, number)
             rows.append((step.index, step.cycles, c, number, end, *middle, size, *ends))
     return rows
@@ -175,8 +175,8 @@ def _rows_3d(step: Step, states: Sequence[str], columns: Columns) -> list[tuple[
 
 def _domain_spread(step: Step, c: int) -> Floats:
     """Largest difference between two domains of all states and modes `(f,)`."""
-    every = [state[c].spread.max(axis=1, initial=0.0) for state in step.sif]
-    return np.max(every, axis=0) if every else np.full(len(step.angle[c]), np.nan)
+    spreads = [state[c].spread.max(axis=1, initial=0.0) for state in step.sif]
+    return np.max(spreads, axis=0) if spreads else np.full(len(step.angle[c]), np.nan)
 
 
 def _longest_bar(step: Step, c: int) -> Floats:
@@ -201,12 +201,12 @@ def _domain_cells(step: Step, c: int) -> Floats:
 
 def _quality_columns(steps: Sequence[Step]) -> Columns:
     """Columns that say how far K is to be trusted, of what the steps have."""
-    every = [sif for step in steps for state in step.sif for sif in state if len(sif.K)]
-    has_cells = bool(every) and all(hasattr(sif, _CELLS) for sif in every)
+    sifs = [sif for step in steps for state in step.sif for sif in state if len(sif.K)]
+    has_cells = bool(sifs) and all(hasattr(sif, _CELLS) for sif in sifs)
     measures: Columns = {"spread": _domain_spread}
     if has_cells:
         measures[_CELLS] = _domain_cells
-    if every and all(sif.errors is not None for sif in every):
+    if sifs and all(sif.errors is not None for sif in sifs):
         measures |= {"bar": _longest_bar, "best": _uses_best_K, "N_bar": _of_N}
     return measures
 
@@ -318,7 +318,7 @@ def polylines(cracks: Sequence[Crack]) -> str:
     ]
     lines, polys = (faces, []) if dim == 2 else (fronts, faces)
     blocks = "".join(_cells(name, part) for name, part in (("Lines", lines), ("Polys", polys)))
-    coordinates = "\n".join(" ".join(repr(float(v)) for v in x) for each in points for x in each)
+    coordinates = "\n".join(" ".join(repr(float(v)) for v in x) for part in points for x in part)
     crack_of = " ".join(str(c) for c, _ in [*lines, *polys])
     counts = f'NumberOfLines="{len(lines)}" NumberOfPolys="{len(polys)}"'
     return f"""<?xml version="1.0"?>
@@ -363,12 +363,12 @@ def measures_of_steps(steps: Sequence[Step], mesh: Mesh) -> Indicators:
     ]
 
 
-def measures_tables(every: Indicators, mesh: Mesh) -> tuple[NDArray[Any], NDArray[Any]]:
+def measures_tables(indicators: Indicators, mesh: Mesh) -> tuple[NDArray[Any], NDArray[Any]]:
     """Measures of each crack of each step, and the ends of their fronts.
 
     Parameters
     ----------
-    every : list of (Step, crack number, Measures)
+    indicators : list of (Step, crack number, Measures)
     mesh : Mesh
         The body.
 
@@ -380,33 +380,33 @@ def measures_tables(every: Indicators, mesh: Mesh) -> tuple[NDArray[Any], NDArra
     ends : structured array
         Columns step, N, crack, front, x, y (, z), set.
     """
-    names = _set_names(every)
+    names = _set_names(indicators)
     columns = [("step", np.int64), ("N", float), ("crack", np.int64)]
     columns += [(name, float) for name in ("area", "front_length", "depth")]
     columns += [(f"{what}_{name}", float) for name in names for what in ("length", "depth")]
     rows = [
         (step.index, step.cycles, c, m.area, m.front_length, m.depth, *_by_set(m, names))
-        for step, c, m in every
+        for step, c, m in indicators
     ]
     width = max((len(name) for name in mesh.facet_sets), default=1)
     places = [(axis, float) for axis in "xyz"[: mesh.dim]]
     kinds = [*columns[:3], ("front", np.int64), *places, ("set", f"U{width}")]
     ends = [
         (step.index, step.cycles, c, end.front, *end.x, end.name)
-        for step, c, m in every
+        for step, c, m in indicators
         for end in m.ends
     ]
     return np.array(rows, dtype=columns), np.array(ends, dtype=kinds)
 
 
-def with_measures(rows: NDArray[Any], every: Indicators, mesh: Mesh) -> NDArray[Any]:
+def with_measures(rows: NDArray[Any], indicators: Indicators, mesh: Mesh) -> NDArray[Any]:
     """The table of steps with the measures of the crack of each row behind its columns.
 
     Parameters
     ----------
     rows : structured array
         What `history.table.table` gives.
-    every : list of (Step, crack number, Measures)
+    indicators : list of (Step, crack number, Measures)
     mesh : Mesh
 
     Returns
@@ -415,14 +415,14 @@ def with_measures(rows: NDArray[Any], every: Indicators, mesh: Mesh) -> NDArray[
         With columns area, depth, ``length_<set>`` and ``depth_<set>``, and for both ends of the
         front of the row, in 2D the mouths of its crack, ``end_0_x`` and so on, and ``end_0_set``.
     """
-    names, axes = _set_names(every), "xyz"[: mesh.dim]
+    names, axes = _set_names(indicators), "xyz"[: mesh.dim]
     width = max((len(name) for name in mesh.facet_sets), default=1)
     columns: list[tuple[str, Any]] = [("area", float), ("depth", float)]
     columns += [(f"{what}_{name}", float) for name in names for what in ("length", "depth")]
     for k in range(2):
         columns += [(f"end_{k}_{axis}", float) for axis in axes]
         columns.append((f"end_{k}_set", f"U{width}"))
-    measures_of_step = {(step.index, c): m for step, c, m in every}
+    measures_of_step = {(step.index, c): m for step, c, m in indicators}
     numbers = rows["front"] if "front" in (rows.dtype.names or ()) else np.full(len(rows), -1)
     result = []
     for row, front in zip(rows, numbers.tolist(), strict=True):
@@ -439,8 +439,8 @@ def with_measures(rows: NDArray[Any], every: Indicators, mesh: Mesh) -> NDArray[
     return np.array(result, dtype=[*rows.dtype.descr, *columns])
 
 
-def _set_names(every: Indicators) -> list[str]:
-    return sorted({trace.name for _, _, m in every for trace in m.traces})
+def _set_names(indicators: Indicators) -> list[str]:
+    return sorted({trace.name for _, _, m in indicators for trace in m.traces})
 
 
 def _by_set(m: Measures, names: Sequence[str]) -> list[float]:
@@ -473,7 +473,7 @@ def fracture_loads(steps: Sequence[Step], K_c: float) -> NDArray[Any]:
         pairs = zip(step.dK_eq, step.R, strict=True)
         K = [float((dK / (1.0 - R)).max()) for dK, R in pairs if len(dK)]
         factor = K_c / max(K)
-        solution = max(step.solutions, key=lambda each: each.energy)
+        solution = max(step.solutions, key=lambda s: s.energy)
         force = _largest_resultant(solution)
         size = _largest_size(step)
         rows.append((step.index, size, factor, factor * force,
