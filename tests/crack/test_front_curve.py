@@ -71,7 +71,7 @@ def test_feet_of_drawn_points(closed):
     local = reach * rng.uniform(-0.7, 0.7, (400, 2))
     result = curve.feet(x + np.einsum("qa,qad->qd", local, frame[:, :2]))
     np.testing.assert_allclose(result.s, s, atol=1e-11)  # round-off over the metric
-    np.testing.assert_allclose(result.local, local, atol=1e-12)
+    np.testing.assert_allclose(result.offset, local, atol=1e-12)
     np.testing.assert_allclose(result.frame, frame, atol=1e-10)
     assert (result.metric > 0).all()
 
@@ -115,7 +115,7 @@ def test_two_vertices_are_a_straight_front():
     curve = front_curve(np.array([[0.2, 1, 0], [0.2, -1, 0]]), frame, False)
     assert curve.length == 2
     assert (curve.bend(np.array([0.0, 0.7, 2.0]), 0.1) == np.inf).all()
-    np.testing.assert_allclose(curve.feet(np.array([[0.7, 0.1, -0.3]])).local, [[0.5, -0.3]])
+    np.testing.assert_allclose(curve.feet(np.array([[0.7, 0.1, -0.3]])).offset, [[0.5, -0.3]])
 
 
 def test_bad_fronts_are_named():

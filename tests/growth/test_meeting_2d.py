@@ -114,7 +114,7 @@ def test_what_a_tip_meets():
     assert meetings(placed(INTO), mesh) == []
     near = [[(0, 10.05), (11.4, 10.05)], INTO[1]]
     (own,) = meetings(placed(near), mesh)
-    assert (own.tip, own.crack, own.other) == (0, 1, -1)
+    assert (own.tip, own.crack, own.facing_tip) == (0, 1, -1)
     assert own.distance == pytest.approx(np.linalg.norm(own.x - (11.4, 10.05)))
     beside = [[(0, 10.05), (11.0, 10.05)], [(20, 13.05), (10.0, 13.05)]]
     assert meetings(placed(beside), mesh) == []

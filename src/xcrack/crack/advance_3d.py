@@ -346,7 +346,7 @@ def _advanced_points(
     arc_of_points = front_curve(old_front.x, old_front.frame, is_closed).breaks
     length = float(arc_of_points[-1])
     pieces = np.where(side > HIGH * size, np.round(side / size), 1).astype(np.int64)
-    inner = division_points(old_front.x, is_closed, pieces, np.zeros(m, dtype=bool))
+    inner_points = division_points(old_front.x, is_closed, pieces, np.zeros(m, dtype=bool))
     own_frame = _frames(old_front)
     x: list[Floats] = []
     place: list[float] = []
@@ -360,14 +360,14 @@ def _advanced_points(
         if j == len(first_point):
             break
         t = np.arange(1, pieces[j]) / pieces[j]
-        x.append(inner[j])
+        x.append(inner_points[j])
         place.extend(arc_of_points[j] + t * (arc_of_points[j + 1] - arc_of_points[j]))
         blend = t[:, None, None]
         frame.append((1 - blend) * own_frame[j, :2] + blend * own_frame[next_point[j], :2])
-    start, where = np.concatenate(x), np.array(place)
+    start, arcs = np.concatenate(x), np.array(place)
     frame_ahead, normal = np.concatenate(frame).transpose(1, 0, 2)
-    step = along_front(s, da, where, is_closed, length)
-    turn = along_front(s, angle, where, is_closed, length)
+    step = along_front(s, da, arcs, is_closed, length)
+    turn = along_front(s, angle, arcs, is_closed, length)
     step[step < min(_LEAST * size, 0.1 * float(step.max()))] = 0.0
     direction = np.cos(turn)[:, None] * frame_ahead + np.sin(turn)[:, None] * normal
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -378,10 +378,10 @@ def _advanced_points(
         return None
     is_vertex = np.zeros(len(start), dtype=bool)
     is_vertex[vertex] = True
-    chosen = is_vertex | ~is_at_rest
-    number = np.cumsum(chosen) - 1
-    rays = chain(start[chosen], stop[chosen], is_at_rest[chosen], is_closed)
-    return rays, number[np.array(vertex)], new_normal[chosen]
+    is_kept = is_vertex | ~is_at_rest
+    number = np.cumsum(is_kept) - 1
+    rays = chain(start[is_kept], stop[is_kept], is_at_rest[is_kept], is_closed)
+    return rays, number[np.array(vertex)], new_normal[is_kept]
 
 
 def _frames(front: Front) -> Floats:
@@ -417,7 +417,7 @@ def _stitched_strip(
     ray_to_vertex[vertex] = np.arange(len(vertex))
     rows_at_rest = np.nonzero(front.is_at_rest)[0]
     own_number[front.owner[rows_at_rest]] = old_front.number[ray_to_vertex[rows_at_rest]]
-    inner = division_points(front.x, front.is_closed, pieces, own_number >= 0)
+    inner_points = division_points(front.x, front.is_closed, pieces, own_number >= 0)
     points: list[Floats] = []
     line: list[int] = []
     begin = np.zeros(n, dtype=np.int64)
@@ -426,8 +426,8 @@ def _stitched_strip(
     for g in range(n):
         begin[g] = len(line)
         new_places = [] if own_number[g] >= 0 else [front.x[g]]
-        if g < len(inner):
-            new_places.extend(inner[g])
+        if g < len(inner_points):
+            new_places.extend(inner_points[g])
         if own_number[g] >= 0:
             line.append(int(own_number[g]))
         for x in new_places:
@@ -442,17 +442,17 @@ def _stitched_strip(
     turned_sides: list[int] = []
     n_sides = len(vertex) if front.is_closed else len(vertex) - 1
     for j in range(n_sides):
-        first, last = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
-        last += n_rays if last <= first else 0
-        owners = front.owner[np.arange(first, last + 1) % n_rays]
+        first, last_ray = int(vertex[j]), int(vertex[(j + 1) % len(vertex)])
+        last_ray += n_rays if last_ray <= first else 0
+        owners = front.owner[np.arange(first, last_ray + 1) % n_rays]
         chain_ahead, crossing_owners = [line[begin[owners[0]]]], []
-        for one, other in zip(owners, owners[1:]):
-            if one != other:
-                crossing_owners.append(int(one))
-                chain_ahead.extend(line[begin[one] + 1 : end[one] + 1])
+        for owner, next_owner in zip(owners, owners[1:]):
+            if owner != next_owner:
+                crossing_owners.append(int(owner))
+                chain_ahead.extend(line[begin[owner] + 1 : end[owner] + 1])
         corners = int(old_front.number[j]), int(old_front.number[(j + 1) % len(vertex)])
         x = np.array([x_of[p] for p in (*corners, *chain_ahead)])
-        expected_normal = normal[first] + normal[last % n_rays]
+        expected_normal = normal[first] + normal[last_ray % n_rays]
         expected_normal /= np.linalg.norm(expected_normal)
         triangles, cosine = stitch_side(corners, chain_ahead, x, expected_normal)
         faces.extend(triangles)

@@ -144,11 +144,11 @@ def _stopped_in_holes(front: FrontChain, size: float, body: Body) -> FrontChain:
     is_outside = depth.reshape(len(move), -1) > 0
     first = np.argmax(is_outside, axis=1)
     is_inside_again = ~is_outside & (np.arange(_SAMPLES + 1) > first[:, None])
-    last = np.argmax(is_inside_again, axis=1)
+    end = np.argmax(is_inside_again, axis=1)
     comes_back = ~is_outside[:, 0] & is_outside.any(axis=1) & is_inside_again.any(axis=1)
-    width = (share[last] - share[first]) * np.linalg.norm(move, axis=1)
+    width = (share[end] - share[first]) * np.linalg.norm(move, axis=1)
     comes_back &= width > _HOLE * size
-    largest_share = np.where(comes_back, (share[first] + share[last]) / 2, 1.0)
+    largest_share = np.where(comes_back, (share[first] + share[end]) / 2, 1.0)
     return _short_ways(front, largest_share, size)
 
 
@@ -168,16 +168,16 @@ def _short_ways(front: FrontChain, share: Floats, size: float) -> FrontChain:
 
 def _facing_parts(fronts: Sequence[FrontChain | None]) -> Iterator[tuple[int, Ints, int, Ints]]:
     """Pairs of parts of fronts that may meet: two fronts, a third of an open one at each end."""
-    for i, one in enumerate(fronts):
-        for j, other in enumerate(fronts[: i + 1]):
-            if one is None or other is None:
+    for i, f in enumerate(fronts):
+        for j, g in enumerate(fronts[: i + 1]):
+            if f is None or g is None:
                 continue
             if i != j:
-                yield i, np.arange(len(one.x)), j, np.arange(len(other.x))
-            elif not one.is_closed and len(one.x) > 3:
-                s = np.cumsum(np.linalg.norm(one.start[1:] - one.start[:-1], axis=1))
-                first, last = (int(np.searchsorted(s, part * s[-1] / 3)) + 1 for part in (1, 2))
-                yield i, np.arange(first), i, np.arange(last, len(one.x))
+                yield i, np.arange(len(f.x)), j, np.arange(len(g.x))
+            elif not f.is_closed and len(f.x) > 3:
+                s = np.cumsum(np.linalg.norm(f.start[1:] - f.start[:-1], axis=1))
+                first, last_row = (int(np.searchsorted(s, part * s[-1] / 3)) + 1 for part in (1, 2))
+                yield i, np.arange(first), i, np.arange(last_row, len(f.x))
 
 
 def _stopped_at_fronts(
@@ -188,20 +188,20 @@ def _stopped_at_fronts(
     meeting_points = [np.zeros((0, 3))]
     for i, rows_of_one, j, rows_of_other in _facing_parts(fronts):
         for a, p, b, q in ((i, rows_of_one, j, rows_of_other), (j, rows_of_other, i, rows_of_one)):
-            one, other = fronts[a], fronts[b]
-            assert one is not None
-            assert other is not None
-            way, opposite_way = one.stop[p] - one.start[p], other.stop[q] - other.start[q]
+            f, g = fronts[a], fronts[b]
+            assert f is not None
+            assert g is not None
+            way, opposite_way = f.stop[p] - f.start[p], g.stop[q] - g.start[q]
             reach = float(
                 np.linalg.norm(way, axis=1).max() + np.linalg.norm(opposite_way, axis=1).max()
             )
-            distance, nearest = cKDTree(other.start[q]).query(
-                one.start[p], distance_upper_bound=reach + _ROOM * size
+            distance, nearest_rows = cKDTree(g.start[q]).query(
+                f.start[p], distance_upper_bound=reach + _ROOM * size
             )
             rows = np.nonzero(np.isfinite(distance) & (distance > 0))[0]
-            rows = rows[body.contains(one.start[p[rows]])]
-            gap, k = distance[rows], nearest[rows]
-            gap_direction = (other.start[q[k]] - one.start[p[rows]]) / gap[:, None]
+            rows = rows[body.contains(f.start[p[rows]])]
+            gap, k = distance[rows], nearest_rows[rows]
+            gap_direction = (g.start[q[k]] - f.start[p[rows]]) / gap[:, None]
             advance_of_one = np.einsum("ij,ij->i", way[rows], gap_direction)
             advance_of_other = -np.einsum("ij,ij->i", opposite_way[k], gap_direction)
             way_length, opposite_length = (
@@ -216,7 +216,7 @@ def _stopped_at_fronts(
                 np.maximum(gap - _ROOM * size, 0.0)[hit] / (advance_of_one + advance_of_other)[hit]
             )
             np.minimum.at(share[a], p[rows[hit]], part)
-            meeting_points.append((one.start[p[rows]] + other.start[q[k]])[hit] / 2)
+            meeting_points.append((f.start[p[rows]] + g.start[q[k]])[hit] / 2)
     result = [
         None if front is None else _short_ways(front, part, size)
         for front, part in zip(fronts, share)
@@ -348,24 +348,24 @@ def _up_to_other_walls(start: Floats, stop: Floats, body: Body) -> Floats:
     depth, size = body.depth((start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
     depth, size = depth.reshape(len(move), -1), size.reshape(len(move), -1)
     is_nearer = depth < depth[:, :1] - 1e-9 * size
-    last = np.where(is_nearer.any(axis=1), np.argmax(is_nearer, axis=1) - 1, _SAMPLES)
-    return np.asarray(start + share[last][:, None] * move)
+    end = np.where(is_nearer.any(axis=1), np.argmax(is_nearer, axis=1) - 1, _SAMPLES)
+    return np.asarray(start + share[end][:, None] * move)
 
 
 def _cut_where_crossing(
-    one: _FrontEnd, other: _FrontEnd, size: float
+    end_a: _FrontEnd, end_b: _FrontEnd, size: float
 ) -> tuple[_FrontEnd, _FrontEnd]:
     """Two ends, as far as they do not cross each other."""
-    if len(one.path) < 2 or len(other.path) < 2:
-        return one, other
-    (x, s), (y, t) = _samples(one.path), _samples(other.path)
+    if len(end_a.path) < 2 or len(end_b.path) < 2:
+        return end_a, end_b
+    (x, s), (y, t) = _samples(end_a.path), _samples(end_b.path)
     gap = np.linalg.norm(x[:, None] - y[None], axis=2)
     longer_way = np.maximum(s[:, None], t[None])
     is_near = gap < _CROSS * size
     if not is_near.any():
-        return one, other
+        return end_a, end_b
     i, j = np.unravel_index(np.argmin(np.where(is_near, longer_way, np.inf)), is_near.shape)
-    return _cut(one, float(s[i]), size), _cut(other, float(t[j]), size)
+    return _cut(end_a, float(s[i]), size), _cut(end_b, float(t[j]), size)
 
 
 def _samples(path: Floats) -> tuple[Floats, Floats]:
@@ -404,17 +404,17 @@ def _led_on(
     stop, is_at_rest, owner = np.array(front.stop), np.array(front.is_at_rest), np.arange(n)
     is_outside = np.zeros(n, dtype=bool)
     for gap in gaps:
-        first, last = (ends[k] if k >= 0 else None for k in gap.ends)
+        first, last_end = (ends[k] if k >= 0 else None for k in gap.ends)
         begin = int(gap.rays[0]) - 1 if first is None else first.base
-        end = int(gap.rays[-1]) + 1 if last is None else last.base
+        end = int(gap.rays[-1]) + 1 if last_end is None else last_end.base
         if begin == end:
             continue  # a single point, which goes on from both sides
         rays = (begin + 1 + np.arange((end - begin - 1) % n)) % n
         if not len(rays):
             continue
-        target, bends = _way_across(front, rays, first, last, size, body)
+        target, bends = _way_across(front, rays, first, last_end, size, body)
         if not len(target):
-            base = first if first is not None else last
+            base = first if first is not None else last_end
             assert base is not None
             owner[rays], stop[rays], is_at_rest[rays] = base.base, base.path[0], False
             continue
@@ -438,14 +438,14 @@ def _way_across(
     front: FrontChain,
     rays: Ints,
     first: _FrontEnd | None,
-    last: _FrontEnd | None,
+    last_end: _FrontEnd | None,
     size: float,
     body: Body,
 ) -> tuple[Floats, Ints]:
     """Where the rays of a gap go, none where the front ends before, and at which it bends."""
     start, no_bends = front.start[rays], np.zeros(0, dtype=np.int64)
-    if first is None or last is None:
-        end = first if first is not None else last
+    if first is None or last_end is None:
+        end = first if first is not None else last_end
         assert end is not None
         points_outwards = start if first is not None else start[::-1]
         if len(end.path) > 1:
@@ -455,24 +455,24 @@ def _way_across(
         if end.is_inside:
             return _up_to_other_walls(start, front.stop[rays], body), no_bends
         return np.zeros((0, 3)), no_bends
-    link = np.linspace(0.0, 1.0, 4 * _SAMPLES + 1)[:, None] * (last.path[-1] - first.path[-1])
+    link = np.linspace(0.0, 1.0, 4 * _SAMPLES + 1)[:, None] * (last_end.path[-1] - first.path[-1])
     width = float(np.linalg.norm(link[-1]))
     if float(body.contains(first.path[-1] + link).mean()) * width > _THROUGH * size:
         # Other walls lie between: faces go on up to them.
         return _up_to_other_walls(start, front.stop[rays], body), no_bends
-    path = np.concatenate([first.path, last.path[::-1]])
-    inner = path[1:-1]
-    if len(inner) == 2 and width < size:
-        inner = inner.mean(axis=0, keepdims=True)
-    path = np.concatenate([path[:1], inner, path[-1:]])
-    s = _arc(np.concatenate([front.start[[first.base]], start, front.start[[last.base]]]))
+    path = np.concatenate([first.path, last_end.path[::-1]])
+    inner_path = path[1:-1]
+    if len(inner_path) == 2 and width < size:
+        inner_path = inner_path.mean(axis=0, keepdims=True)
+    path = np.concatenate([path[:1], inner_path, path[-1:]])
+    s = _arc(np.concatenate([front.start[[first.base]], start, front.start[[last_end.base]]]))
     share = _arc(path)[1:-1] / _arc(path)[-1]
     bends = np.unique(np.abs(s[1:-1, None] / s[-1] - share).argmin(axis=0))
-    if len(bends) < len(inner):
-        inner, bends = inner[:0], no_bends
+    if len(bends) < len(inner_path):
+        inner_path, bends = inner_path[:0], no_bends
     # A bend falls on a ray, and the others lie evenly between.
     known_rows = np.concatenate([[0], bends + 1, [len(s) - 1]])
-    full_path = np.concatenate([path[:1], inner, path[-1:]])
+    full_path = np.concatenate([path[:1], inner_path, path[-1:]])
     at = np.interp(s[1:-1], s[known_rows], np.arange(len(known_rows)))
     return np.stack(
         [np.interp(at, np.arange(len(known_rows)), full_path[:, k]) for k in range(3)], axis=1

@@ -59,15 +59,15 @@ def open_fronts(
     for mouth in runs_of(~outline.is_inside):
         vertex = np.append(mouth, (mouth[-1] + 1) % m) if runs else mouth
         offset = np.zeros((len(vertex), 3))
-        inner = np.array(is_movable[vertex])
+        is_inner = np.array(is_movable[vertex])
         if runs:
             room = (len(mouth) - 1) // 2
             is_old = outline.candidate[mouth] & (not outline.first_time)
             deepest_point = int(vertex[np.argmax(depth[vertex])])
             if _passes_hole(x, mouth, deepest_point, outward_direction, normal, is_old, body):
-                first, last = _across_hole(depth[vertex], size[vertex])
+                first, end = _across_hole(depth[vertex], size[vertex])
                 points_after[int(vertex[0])] = loop[vertex[1 : first + 1]]
-                points_before[int(vertex[-1])] = loop[vertex[last:-1]]
+                points_before[int(vertex[-1])] = loop[vertex[end:-1]]
                 continue
             ways = (x, depth, size, outward_direction)
             largest_length = _INSIDE[0] if outline.first_time else _INSIDE[1]
@@ -75,22 +75,22 @@ def open_fronts(
             stop, offset[-1] = _led_out(
                 *ways, vertex[::-1], is_old[::-1], room, largest_length, body
             )
-            last = len(vertex) - 1 - stop
+            end = len(vertex) - 1 - stop
             points_after[int(vertex[0])] = loop[vertex[1 : first + 1]]
-            points_before[int(vertex[-1])] = loop[vertex[last:-1]]
+            points_before[int(vertex[-1])] = loop[vertex[end:-1]]
             ends = offset[[0, -1]]
-            start, vertex = int(vertex[0]), vertex[first : last + 1]
+            start, vertex = int(vertex[0]), vertex[first : end + 1]
             goal = int(mouth[-1] + 1) % m
-            offset, inner = offset[: len(vertex)], inner[first : last + 1]
+            offset, is_inner = offset[: len(vertex)], is_inner[first : end + 1]
             offset[[0, -1]] = ends
-            inner[[0, -1]] = False
+            is_inner[[0, -1]] = False
         way = (
             _side_by_side(x[vertex], outward_direction[vertex], offset)
             if runs
             else outward_direction[vertex]
         )
-        offset[inner] = _push_vectors(
-            x[vertex[inner]], way[inner], depth[vertex[inner]], size[vertex[inner]],
+        offset[is_inner] = _push_vectors(
+            x[vertex[is_inner]], way[is_inner], depth[vertex[is_inner]], size[vertex[is_inner]],
             body, outline.first_time,
         )  # fmt: skip
         offset = _untangled_rays(x, vertex, offset, normal, not runs)
@@ -143,9 +143,9 @@ def is_enclosed(x: Floats, normal: Floats, body: Body) -> Bools:
         corner, angle = body.mesh.points, 2 * np.pi * (np.arange(_AROUND) + 0.3) / _AROUND
         reach = float(np.linalg.norm(corner.max(axis=0) - corner.min(axis=0)))
         axis = np.eye(3)[np.argmin(np.abs(normal[result]), axis=1)]
-        one = unit(np.cross(normal[result], axis))
-        other = np.cross(normal[result], one)
-        way = np.cos(angle)[:, None] * one[:, None] + np.sin(angle)[:, None] * other[:, None]
+        u = unit(np.cross(normal[result], axis))
+        v = np.cross(normal[result], u)
+        way = np.cos(angle)[:, None] * u[:, None] + np.sin(angle)[:, None] * v[:, None]
         start = np.repeat(x[result], _AROUND, axis=0)
         triangle_hit, _ = first_crossing(body.boundary, start, start + reach * way.reshape(-1, 3))
         n_blocked = (triangle_hit.reshape(-1, _AROUND) >= 0).sum(axis=1)
@@ -173,11 +173,11 @@ def _passes_hole(
     """Whether a front goes on across a mouth: it did before, or is drawn straight across a hole."""
     m = len(x)
     if (~is_old).sum() > 1:
-        first, last = int(mouth[0]), int(mouth[-1] + 1) % m
-        way = unit(x[last] - x[first])
+        first, end = int(mouth[0]), int(mouth[-1] + 1) % m
+        way = unit(x[end] - x[first])
         direction_back, direction_on = (
             unit(x[first] - x[first - 1]),
-            unit(x[(last + 1) % m] - x[last]),
+            unit(x[(end + 1) % m] - x[end]),
         )
         if is_old.any() or min(direction_back @ way, direction_on @ way) < _STRAIGHT:
             return False
@@ -240,8 +240,8 @@ def _outward_directions(points: Floats, faces: Ints, loop: Ints) -> tuple[Floats
     side = np.searchsorted(key[order], loop * n + np.roll(loop, -1))
     normal = face_normals(points, faces[owner[order[side]]])
     next_side = np.roll(points[loop], -1, axis=0) - points[loop]
-    one = unit(np.cross(normal, next_side))
-    return unit(one + np.roll(one, 1, axis=0)), normal
+    direction = unit(np.cross(normal, next_side))
+    return unit(direction + np.roll(direction, 1, axis=0)), normal
 
 
 def _side_by_side(x: Floats, outward_direction: Floats, offset: Floats) -> Floats:
@@ -270,8 +270,8 @@ def _untangled_rays(
         inner_sides, outer_sides = np.diff(a, axis=0), np.diff(a + o, axis=0)
         n = normal[vertex[: len(inner_sides)]]
         is_turned = np.zeros(len(inner_sides), dtype=bool)
-        for one, other in ((inner_sides, inner_sides + o[1:]), (inner_sides + o[1:], o[:-1])):
-            area = np.einsum("ij,ij->i", np.cross(one, other), n)
+        for u, v in ((inner_sides, inner_sides + o[1:]), (inner_sides + o[1:], o[:-1])):
+            area = np.einsum("ij,ij->i", np.cross(u, v), n)
             is_turned |= area < -1e-12 * np.einsum("ij,ij->i", outer_sides, outer_sides)
         if not is_turned.any():
             break
@@ -390,9 +390,9 @@ def _way_out(
     """
     steps = _STEP * np.arange(int(_REACH / _STEP) + 1)
     trial = x[:, None] + (steps * size[:, None])[..., None] * direction[:, None]
-    every, _ = body.depth(trial.reshape(-1, 3))
+    depth, _ = body.depth(trial.reshape(-1, 3))
     result = np.zeros(len(x))
-    for k, row in enumerate(every.reshape(len(x), -1) / size[:, None]):
+    for k, row in enumerate(depth.reshape(len(x), -1) / size[:, None]):
         is_outside = row > ON
         first = int(np.argmax(is_outside))
         if (
@@ -404,8 +404,8 @@ def _way_out(
         rows_inside = np.nonzero(~is_outside[first:])[0]
         stop = first + int(rows_inside[0]) if len(rows_inside) else len(steps)
         deep_enough = np.nonzero(row[first:stop] >= target_depth)[0]
-        last = first + int(deep_enough[0]) if len(deep_enough) else stop - 1
-        way_along = _way_along_wall(row[first : last + 1])
+        end = first + int(deep_enough[0]) if len(deep_enough) else stop - 1
+        way_along = _way_along_wall(row[first : end + 1])
         if way_along is not None:
             result[k] = steps[first + way_along]
         elif len(deep_enough) and first + deep_enough[0] > 0:
@@ -453,10 +453,10 @@ def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> floa
     if not is_outside[first] or (row[:first] < row[0] + _SLOPE * steps[:first] - _SLACK).any():
         return 0.0
     falls = np.nonzero(row[first + 1 :] < row[first:-1] - 1e-9)[0]
-    last = first + int(falls[0]) if len(falls) else len(steps) - 1
-    deep_enough = np.nonzero(row[first : last + 1] >= OUTSIDE)[0]
+    end = first + int(falls[0]) if len(falls) else len(steps) - 1
+    deep_enough = np.nonzero(row[first : end + 1] >= OUTSIDE)[0]
     if not len(deep_enough):
-        return float(steps[first + int(np.argmax(row[first : last + 1]))] * size)
+        return float(steps[first + int(np.argmax(row[first : end + 1]))] * size)
     j = first + int(deep_enough[0])
     if j == 0:
         return 0.0

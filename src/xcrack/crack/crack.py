@@ -94,8 +94,8 @@ class Crack:
         x = np.zeros((len(tips), 2))
         frame = np.zeros((len(tips), 2, 2))
         for k, tip in enumerate(tips):
-            first, second = (1, 0) if tip == 0 else (tip - 1, tip)
-            piece = self.points[second] - self.points[first]
+            start, stop = (1, 0) if tip == 0 else (tip - 1, tip)
+            piece = self.points[stop] - self.points[start]
             direction = piece / np.linalg.norm(piece)
             normal = np.array([-direction[1], direction[0]])
             x[k] = self.points[tip]

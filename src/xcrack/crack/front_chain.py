@@ -53,8 +53,8 @@ class FrontChain:
     @property
     def old_side(self) -> Floats:
         """Where each side comes from: between the middles of what its ends were."""
-        first, last = self.members()
-        return steps((self.start[first] + self.start[last]) / 2, self.is_closed)
+        first, last_row = self.members()
+        return steps((self.start[first] + self.start[last_row]) / 2, self.is_closed)
 
     def members(self) -> tuple[Ints, Ints]:
         """First and last of those that became each point, `(g,)` both."""
@@ -63,9 +63,9 @@ class FrontChain:
         first = np.nonzero(changes)[0]
         if not len(first):
             first = np.zeros(1, dtype=np.int64)
-        last = (np.roll(first, -1) - 1) % len(self.owner)
+        last_row = (np.roll(first, -1) - 1) % len(self.owner)
         order = np.argsort(self.owner[first], kind="stable")
-        return first[order], last[order]
+        return first[order], last_row[order]
 
     def fixed_sides(self) -> Bools:
         """Sides that are part of the old front and remain."""
@@ -112,19 +112,19 @@ def merge_side(front: FrontChain, side: int, x: Floats) -> FrontChain:
     FrontChain
     """
     n = len(front.x)
-    one, other = side, (side + 1) % n
-    if front.is_pinned[one]:
-        x = front.x[one]
-    elif front.is_pinned[other]:
-        x = front.x[other]
+    point, next_point = side, (side + 1) % n
+    if front.is_pinned[point]:
+        x = front.x[point]
+    elif front.is_pinned[next_point]:
+        x = front.x[next_point]
     is_pinned = np.array(front.is_pinned)
-    is_pinned[one] |= is_pinned[other]
+    is_pinned[point] |= is_pinned[next_point]
     points = np.array(front.x)
-    points[one] = x
+    points[point] = x
     number = np.arange(n)
-    number[other] = one
-    number[number > other] -= 1
-    is_other = np.arange(n) != other
+    number[next_point] = point
+    number[number > next_point] -= 1
+    is_other = np.arange(n) != next_point
     return replace(
         front, x=points[is_other], is_pinned=is_pinned[is_other], owner=number[front.owner]
     )
@@ -152,16 +152,16 @@ def without_loops(front: FrontChain) -> FrontChain:
 
 def _join_side_ends(front: FrontChain, side: int) -> FrontChain:
     """Both ends of a side merged half way between the outermost of what they come from."""
-    first, last = front.members()
-    other = (side + 1) % len(front.x)
-    return merge_side(front, side, (front.stop[first[side]] + front.stop[last[other]]) / 2)
+    first, last_row = front.members()
+    end = (side + 1) % len(front.x)
+    return merge_side(front, side, (front.stop[first[side]] + front.stop[last_row[end]]) / 2)
 
 
 def without_sides(front: FrontChain, sides: Ints) -> FrontChain:
     """A front in which the ends of the sides with these numbers are merged if one is free."""
     for side in sorted(set(sides.tolist()), reverse=True):
-        other = (side + 1) % len(front.x)
-        if len(front.x) > 3 and not (front.is_pinned[side] and front.is_pinned[other]):
+        end = (side + 1) % len(front.x)
+        if len(front.x) > 3 and not (front.is_pinned[side] and front.is_pinned[end]):
             front = _join_side_ends(front, side)
     return front
 
@@ -240,9 +240,9 @@ def spaced_front(front: FrontChain, least_side: float) -> FrontChain:
         side = int(np.argmin(free_length))
         if free_length[side] >= least_side:
             return front
-        other = (side + 1) % n
+        end = (side + 1) % n
         # The point whose neighbour on the far side is nearer can better be spared.
-        point_that_stays = side if length[side - 1] > length[other % len(length)] else other
+        point_that_stays = side if length[side - 1] > length[end % len(length)] else end
         front = merge_side(front, side, front.x[point_that_stays])
 
 
@@ -304,13 +304,13 @@ def division_points(x: Floats, is_closed: bool, pieces: Ints, is_straight: Bools
     for j, count in enumerate(pieces):
         t = (np.arange(1, count) / count)[:, None]
         a, b = j, (j + 1) % len(x)
-        inner = x[a] + t * side[j]
+        points = x[a] + t * side[j]
         bends = count > 1 and not (is_straight[a] or is_straight[b])
         if bends and min(tangent[a] @ unit[j], tangent[b] @ unit[j]) > np.sqrt((1 + _BEND) / 2):
             # Written as chord and bulge: a straight side stays straight to the last bit.
-            first, last = length[j] * tangent[a] - side[j], length[j] * tangent[b] - side[j]
-            inner += t * (1 - t) * ((1 - t) * first - t * last)
-        result.append(inner)
+            p, q = length[j] * tangent[a] - side[j], length[j] * tangent[b] - side[j]
+            points += t * (1 - t) * ((1 - t) * p - t * q)
+        result.append(points)
     return result
 
 
@@ -339,25 +339,25 @@ def stitch_side(
         area.
     """
     place = [corners[0], corners[1], *numbers]
-    best: list[tuple[int, int, int]] = []
+    best_triangles: list[tuple[int, int, int]] = []
     quality, best_cosine = -np.inf, -1.0
     for turn in range(len(numbers)):
-        local = [(0, q + 3, q + 2) for q in range(turn)]
-        local.append((0, 1, turn + 2))
-        local.extend((1, q + 3, q + 2) for q in range(turn, len(numbers) - 1))
-        local = [
+        triangles = [(0, q + 3, q + 2) for q in range(turn)]
+        triangles.append((0, 1, turn + 2))
+        triangles.extend((1, q + 3, q + 2) for q in range(turn, len(numbers) - 1))
+        triangles = [
             (a, b, c)
-            for a, b, c in local
+            for a, b, c in triangles
             if place[a] != place[b] != place[c] and place[a] != place[c]
         ]
-        if not local:
+        if not triangles:
             return [], 1.0
-        shape, cosine = _worst_triangle(x, np.array(local), normal)
+        shape, cosine = _worst_triangle(x, np.array(triangles), normal)
         # The first way unless another is clearly better: neighbours are cut alike.
         if shape > (quality / _LIKE if quality > 0 else quality):
-            best = [(place[a], place[b], place[c]) for a, b, c in local]
+            best_triangles = [(place[a], place[b], place[c]) for a, b, c in triangles]
             quality, best_cosine = shape, cosine
-    return best, best_cosine
+    return best_triangles, best_cosine
 
 
 def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, float]:

@@ -24,7 +24,7 @@ class FootPoints:
     ----------
     s : (q,) array, length
         Parameter of the foot.
-    local : (q, 2) array, length
+    offset : (q, 2) array, length
         x1 along t and x2 along n.
     frame : (q, 3, 3) array
         Rows (t, n, b) at the foot.
@@ -33,25 +33,25 @@ class FootPoints:
     """
 
     s: Floats
-    local: Floats
+    offset: Floats
     frame: Floats
     turn: Floats
 
     def subset(self, selection: Bools | Ints) -> "FootPoints":
         """Some of the points, by a mask or by their numbers."""
         return FootPoints(
-            self.s[selection], self.local[selection], self.frame[selection], self.turn[selection]
+            self.s[selection], self.offset[selection], self.frame[selection], self.turn[selection]
         )
 
     @property
     def r(self) -> Floats:
         """Distance to the front `(q,)`."""
-        return np.hypot(self.local[:, 0], self.local[:, 1])
+        return np.hypot(self.offset[:, 0], self.offset[:, 1])
 
     @property
     def metric(self) -> Floats:
         """Length along b for a unit of arc of the front, 1 - kt x1 - kn x2 `(q,)`."""
-        return 1 - (self.turn[:, :2] * self.local).sum(axis=1)
+        return 1 - (self.turn[:, :2] * self.offset).sum(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +85,9 @@ class FrontCurve:
 
     @cached_property
     def _guesses(self) -> tuple[Floats, Floats]:
-        each = max(_LEAST, -(-_SAMPLES // (len(self.breaks) - 1)))
-        inner = np.arange(each) / each
-        s = (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * inner).ravel()
+        n_parts = max(_LEAST, -(-_SAMPLES // (len(self.breaks) - 1)))
+        share = np.arange(n_parts) / n_parts
+        s = (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * share).ravel()
         s = np.append(s, self.breaks[-1])
         return s, self.at(s)[0]
 
@@ -182,15 +182,15 @@ class FrontCurve:
         (q,) array, length
             inf where a front is straight.
         """
-        low, high = np.asarray(s) - length_of_mean / 2, np.asarray(s) + length_of_mean / 2
+        start, stop = np.asarray(s) - length_of_mean / 2, np.asarray(s) + length_of_mean / 2
         if not self.closed:
-            low, high = np.clip(low, 0.0, self.length), np.clip(high, 0.0, self.length)
-        tangent_ahead, tangent_behind = self.at(high)[1][:, 2], self.at(low)[1][:, 2]
+            start, stop = np.clip(start, 0.0, self.length), np.clip(stop, 0.0, self.length)
+        tangent_ahead, tangent_behind = self.at(stop)[1][:, 2], self.at(start)[1][:, 2]
         angle = 2 * np.arcsin(
             np.minimum(np.linalg.norm(tangent_ahead - tangent_behind, axis=1) / 2, 1.0)
         )
-        is_straight = angle * self.length <= _STRAIGHT * (high - low)
-        return np.where(is_straight, np.inf, (high - low) / np.where(is_straight, 1.0, angle))
+        is_straight = angle * self.length <= _STRAIGHT * (stop - start)
+        return np.where(is_straight, np.inf, (stop - start) / np.where(is_straight, 1.0, angle))
 
     def arc(self, s: Floats) -> Floats:
         """Arc length from the first vertex `(q,)` at parameters within the breaks."""
@@ -243,8 +243,8 @@ def front_curve(x: Floats, frame: Floats, is_closed: bool) -> FrontCurve:
         x, normal, b = (np.concatenate([v, v[:1]]) for v in (x, normal, b))
     chord = np.linalg.norm(np.diff(x, axis=0), axis=1)
     if chord.min() <= 1e-9 * chord.sum():
-        where = np.round(x[int(np.argmin(chord))], 6).tolist()
-        raise GeometryError(f"two vertices of a crack front coincide at {where}: leave one out.")
+        spot = np.round(x[int(np.argmin(chord))], 6).tolist()
+        raise GeometryError(f"two vertices of a crack front coincide at {spot}: leave one out.")
     if np.einsum("md,md->", np.diff(x, axis=0), b[1:] + b[:-1]) < 0:
         raise GeometryError("the vertices of a crack front run against b = t × n: reverse them.")
     ends = "periodic" if is_closed else "not-a-knot"

@@ -95,18 +95,18 @@ def _ends_on(
     refuses those that overlap it. Of others those count first that do not end there too.
     """
     direction = (end - previous_point) / np.linalg.norm(end - previous_point)
-    best, chosen = (True, np.inf), None
-    for other, crack in enumerate(cracks):
-        if other == c:
+    best_rank, on = (True, np.inf), None
+    for k, crack in enumerate(cracks):
+        if k == c:
             continue
         foot, distance = _nearest_point(end, crack.points)
         if distance > _ON * size or _sine(direction, _arms(foot, crack.points, size)) < 1e-3:
             continue
         to_ends = np.linalg.norm(crack.points[[0, -1]] - foot, axis=1)
         rank = bool(to_ends.min() < _APART * size), distance
-        if rank < best:
-            best, chosen = rank, other
-    return chosen
+        if rank < best_rank:
+            best_rank, on = rank, k
+    return on
 
 
 def _nearest_point(x: Floats, line: Floats) -> tuple[Floats, float]:
@@ -145,8 +145,8 @@ def junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
     """
     result = []
     for c, crack in enumerate(cracks):
-        last = len(crack.points) - 1
-        ends = [end for end in (0, last) if end not in (crack.tips or ())]
+        last_point = len(crack.points) - 1
+        ends = [end for end in (0, last_point) if end not in (crack.tips or ())]
         if not ends:
             continue
         for end, is_inside in zip(ends, contains(mesh, crack.points[ends]).tolist()):
@@ -202,14 +202,14 @@ def _junction(c: int, end: int, cracks: tuple[Crack, ...], mesh: Mesh) -> Juncti
 
 def _crack_at(c: int, x: Floats, cracks: tuple[Crack, ...], h: float) -> int:
     """The crack on which x lies between its ends; of several the one with its ends farthest."""
-    inner, on = -1.0, -1
-    for other, crack in enumerate(cracks):
-        if other == c or _nearest_point(x, crack.points)[1] > _SAME * h:
+    largest_distance, on = -1.0, -1
+    for k, crack in enumerate(cracks):
+        if k == c or _nearest_point(x, crack.points)[1] > _SAME * h:
             continue
         to_ends = float(np.linalg.norm(crack.points[[0, -1]] - x, axis=1).min())
-        if to_ends > inner:
-            inner, on = to_ends, other
-    if inner > _SAME * h:
+        if to_ends > largest_distance:
+            largest_distance, on = to_ends, k
+    if largest_distance > _SAME * h:
         return on
     if on >= 0:
         raise GeometryError(
@@ -255,12 +255,12 @@ def _check_apart(result: list[Junction], cracks: tuple[Crack, ...], mesh: Mesh) 
                         f"closer than a cell ({least_distance:.4g}): move it away from the tip, "
                         f"refine the mesh there, or let both cracks be one that runs through."
                     )
-        for other in result[:i]:
-            distance = float(np.linalg.norm(other.x - junction.x))
-            is_opposite = other.on == junction.on and other.side != junction.side
+        for joint in result[:i]:
+            distance = float(np.linalg.norm(joint.x - junction.x))
+            is_opposite = joint.on == junction.on and joint.side != junction.side
             if distance < least_distance and not is_opposite:
                 raise GeometryError(
-                    f"cracks {other.crack} and {junction.crack} end {distance:.4g} from each other "
+                    f"cracks {joint.crack} and {junction.crack} end {distance:.4g} from each other "
                     f"at {at(junction.x)}, closer than a cell ({least_distance:.4g}) and from the "
                     f"same side: let them end on each other's continuation, a cell or more apart, "
                     f"or on opposite sides of one crack."

@@ -162,9 +162,9 @@ def _ends_on(crack: Crack, on: int) -> bool:
     return any(number == on for number, _ in crack.ends_on)
 
 
-def are_opposite(one: Crack, other: Crack) -> bool:
+def are_opposite(crack_a: Crack, crack_b: Crack) -> bool:
     """Whether two cracks end on opposite sides of the same one."""
-    return any((on, -side) in other.ends_on for on, side in one.ends_on)
+    return any((on, -side) in crack_b.ends_on for on, side in crack_a.ends_on)
 
 
 def renumbered_arms(cracks: Sequence[Crack], i: int, k: int, is_aligned: bool) -> list[Crack]:
@@ -278,13 +278,13 @@ def face_ahead(
     reach : float
         Legs of cells; farther away nothing is sought.
     """
-    best = None
+    nearest_face = None
     for front, way, leg in _ways_to_face(cracks, c, on, body, reach):
         k = int(np.argmin(way))
-        if np.isfinite(way[k]) and (best is None or way[k] < best.width):
+        if np.isfinite(way[k]) and (nearest_face is None or way[k] < nearest_face.width):
             x = front.x[k] + way[k] * front.frame[k, 0]
-            best = FaceAhead(c, on, float(way[k]), float(leg[k]), x)
-    return best
+            nearest_face = FaceAhead(c, on, float(way[k]), float(leg[k]), x)
+    return nearest_face
 
 
 def _ways_to_face(
@@ -292,13 +292,13 @@ def _ways_to_face(
 ) -> list[tuple[Front, Floats, Floats]]:
     """Fronts of crack c near another one: ways `(m,)` straight ahead to its face, legs of cells."""
     largest_reach = reach * _LEG * float(body.mesh.cell_size.max())
-    low = cracks[on].points.min(axis=0) - largest_reach
-    high = cracks[on].points.max(axis=0) + largest_reach
+    box_min = cracks[on].points.min(axis=0) - largest_reach
+    box_max = cracks[on].points.max(axis=0) + largest_reach
     result = []
     tree: TriangleTree | None = None
     body_before = body
     for front in front_frames(cracks[c]):
-        rows = np.nonzero(((front.x >= low) & (front.x <= high)).all(axis=1))[0]
+        rows = np.nonzero(((front.x >= box_min) & (front.x <= box_max)).all(axis=1))[0]
         if not len(rows):
             continue
         if tree is None:
@@ -472,10 +472,10 @@ def front_distance_of(cracks: Sequence[Crack], i: int, k: int, body: Body) -> fl
     return float((cKDTree(y).query(x)[0] / body.cell_size(x)).min())
 
 
-def crossings(one: Crack, other: Crack) -> Floats:
+def crossings(crack_a: Crack, crack_b: Crack) -> Floats:
     """Points at which edges of either surface cross the other one `(n, 3)`."""
     parts = [np.zeros((0, 3))]
-    for a, b in ((one, other), (other, one)):
+    for a, b in ((crack_a, crack_b), (crack_b, crack_a)):
         tree = triangle_tree(b.points, b.faces)
         pairs = np.unique(np.sort(sides(a.faces).reshape(-1, 2), axis=1), axis=0)
         start, stop = a.points[pairs[:, 0]], a.points[pairs[:, 1]]

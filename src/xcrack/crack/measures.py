@@ -45,8 +45,8 @@ _Measures = tuple[float, float, dict[int, tuple[float, float]], list[tuple[Float
 
 def measures_of_line(crack: Crack, mesh: Mesh, group: Ints) -> _Measures:
     """Measures of a placed 2D crack: its length inside, 0, depths, mouths with front -1."""
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-    sides = mesh.points[mesh.facets[outer]]
+    walls = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    sides = mesh.points[mesh.facets[walls]]
     tips, _ = tip_frames(crack)
     ends: list[tuple[Floats, int, int]] = []
     pieces = list(zip(crack.points, np.diff(crack.points, axis=0), strict=False))
@@ -54,11 +54,11 @@ def measures_of_line(crack: Crack, mesh: Mesh, group: Ints) -> _Measures:
         for t in np.unique(parts):
             x = p + t * r
             distance = distance_to_simplices(x, sides)
-            best = int(np.argmin(distance))
+            row = int(np.argmin(distance))
             # Pieces meet inside the body, and tips lie there: neither is a mouth.
-            if distance[best] <= _END * mesh.extent and not _is_tip(x, tips, mesh.extent):
+            if distance[row] <= _END * mesh.extent and not _is_tip(x, tips, mesh.extent):
                 if not any(np.linalg.norm(x - y) <= _END * mesh.extent for y, _, _ in ends):
-                    ends.append((x, int(outer[best]), -1))
+                    ends.append((x, int(walls[row]), -1))
     traces: dict[int, tuple[float, float]] = {}
     for x, facet, _ in ends:
         tip_distance = np.linalg.norm(tips - x, axis=1).max(initial=0.0)
@@ -154,13 +154,13 @@ def _front_length_inside(crack: Crack, body: Body) -> float:
         length = np.linalg.norm(side, axis=1)
         parts = np.clip(np.ceil(length / finest_size), 1, _MOST).astype(np.int64)
         row, part = ranges(parts)
-        one, other = (
+        depth_a, depth_b = (
             body.depth(x[row] + ((part + end) / parts[row])[:, None] * side[row])[0]
             for end in (0, 1)
         )
-        low, high = np.minimum(one, other), np.maximum(one, other)
-        width = np.where(high > low, high - low, 1.0)
-        share = np.where(high <= 0, 1.0, np.where(low >= 0, 0.0, -low / width))
+        d_min, d_max = np.minimum(depth_a, depth_b), np.maximum(depth_a, depth_b)
+        width = np.where(d_max > d_min, d_max - d_min, 1.0)
+        share = np.where(d_max <= 0, 1.0, np.where(d_min >= 0, 0.0, -d_min / width))
         total += float(share @ (length / parts)[row])
     return total
 
@@ -246,12 +246,12 @@ def _share_below_zero(values: Floats) -> Floats:
     """Share of each triangle in which the linear function with these corner values is < 0."""
     n_below = (values < 0).sum(axis=1)
     sorted_values = np.sort(values, axis=1)
-    low, middle, high = sorted_values.T
-    spread = np.where(high > low, high - low, 1.0)
-    share_of_one = low**2 / (np.where(middle > low, middle - low, 1.0) * spread)
-    share_of_two = 1 - high**2 / (spread * np.where(high > middle, high - middle, 1.0))
+    v_min, middle, v_max = sorted_values.T
+    spread = np.where(v_max > v_min, v_max - v_min, 1.0)
+    share_of_one = v_min**2 / (np.where(middle > v_min, middle - v_min, 1.0) * spread)
+    share_of_two = 1 - v_max**2 / (spread * np.where(v_max > middle, v_max - middle, 1.0))
     return np.asarray(
-        np.choose(n_below, [np.zeros_like(low), share_of_one, share_of_two, np.ones_like(low)])
+        np.choose(n_below, [np.zeros_like(v_min), share_of_one, share_of_two, np.ones_like(v_min)])
     )
 
 
@@ -268,13 +268,13 @@ _BISECTIONS = 60
 def measures_of_surface(crack: Crack, mesh: Mesh, group: Ints) -> _Measures:
     """Measures of a placed 3D crack."""
     body = Body.of(mesh)
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    walls = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     segment = _trace(crack, body)
-    facet = outer[signed_in(body.boundary, segment.mean(axis=1))[1]] if len(segment) else outer[:0]
+    facet = walls[signed_in(body.boundary, segment.mean(axis=1))[1]] if len(segment) else walls[:0]
     fronts = [_front_points(crack, front, body) for front in crack.fronts or ()]
     candidates = np.concatenate([np.zeros((0, 3)), *fronts])
     ends = [
-        (x, int(outer[signed_in(body.boundary, x[None])[1][0]]), k)
+        (x, int(walls[signed_in(body.boundary, x[None])[1][0]]), k)
         for k, x in front_ends(crack, body)
     ]
     # Traces and fronts end at the same places.
@@ -393,16 +393,16 @@ def _ends(x: Floats, body: Body) -> list[Floats]:
     return result
 
 
-def _boundary_crossing(one: Floats, other: Floats, body: Body) -> Floats:
+def _boundary_crossing(p: Floats, q: Floats, body: Body) -> Floats:
     """Place on the boundary between a point inside and one outside."""
-    is_inside = body.depth(one[None])[0][0] < 0
+    is_inside = body.depth(p[None])[0][0] < 0
     for _ in range(_BISECTIONS):
-        middle = (one + other) / 2
+        middle = (p + q) / 2
         if (body.depth(middle[None])[0][0] < 0) == is_inside:
-            one = middle
+            p = middle
         else:
-            other = middle
-    return np.asarray((one + other) / 2)
+            q = middle
+    return np.asarray((p + q) / 2)
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ class Meeting:
         From the tip to there; negative where it lies beyond.
     crack : int
         The other crack.
-    other : int
+    facing_tip : int
         Row of the facing tip, or -1 for a flank.
     size : float, length
         Of the cell there.
@@ -133,13 +133,13 @@ class Meeting:
     x: Floats
     distance: float
     crack: int
-    other: int
+    facing_tip: int
     size: float
 
     @property
     def is_soon(self) -> bool:
         """Whether the tip is too close to what it meets for another step."""
-        return self.distance <= _SOON * self.size * (1.0 if self.other < 0 else _FACING)
+        return self.distance <= _SOON * self.size * (1.0 if self.facing_tip < 0 else _FACING)
 
 
 def meetings(cracks: Sequence[Crack], mesh: Mesh, reach_in_cells: float = AHEAD) -> list[Meeting]:
@@ -174,9 +174,9 @@ def meetings(cracks: Sequence[Crack], mesh: Mesh, reach_in_cells: float = AHEAD)
             int(owner[row]), faces.anchor[row], x + reach_in_cells * h * direction, cracks, mesh
         )
         if flank is not None:
-            end, other = flank
-            end = _behind_tips(end, cracks[other], _BEHIND * h)
-            result.append(Meeting(row, end, float((end - x) @ direction), other, -1, h))
+            end, on = flank
+            end = _behind_tips(end, cracks[on], _BEHIND * h)
+            result.append(Meeting(row, end, float((end - x) @ direction), on, -1, h))
     return sorted(result, key=lambda meeting: meeting.distance)
 
 
@@ -200,9 +200,9 @@ def _flank(
     c: int, begin: Floats, end: Floats, cracks: Sequence[Crack], mesh: Mesh
 ) -> tuple[Floats, int] | None:
     """Where the last face of crack c, prolonged, first crosses another crack in the body."""
-    best, distance = None, np.inf
-    for other, crack in enumerate(cracks):
-        if other == c:
+    crossing, distance = None, np.inf
+    for c_there, crack in enumerate(cracks):
+        if c_there == c:
             continue
         x = crossing_points(np.stack([begin, end]), crack.points)
         x = x[contains(mesh, x)] if len(x) else x
@@ -212,8 +212,8 @@ def _flank(
         )
         if len(x) and distance_to_points.min() < distance:
             k = int(np.argmin(distance_to_points))
-            best, distance = (x[k], other), float(distance_to_points[k])
-    return best
+            crossing, distance = (x[k], c_there), float(distance_to_points[k])
+    return crossing
 
 
 def _behind_tips(x: Floats, crack: Crack, room: float) -> Floats:
@@ -254,31 +254,31 @@ def joined_cracks(
     for meeting in meetings_made:
         c, k = tip_of[meeting.tip]
         first = (cracks[c].tips or ())[k] == 0
-        if meeting.other < 0:
+        if meeting.facing_tip < 0:
             crack = result[c]
             assert crack is not None
             result[c] = _with_new_end(crack, first, meeting.x, has_moved[meeting.tip], True)
-        elif meeting.tip < meeting.other and (c, first) not in at_end:
-            other, tip_number = tip_of[meeting.other]
-            last = (cracks[other].tips or ())[tip_number] == 0
-            if (other, last) in at_end:
+        elif meeting.tip < meeting.facing_tip and (c, first) not in at_end:
+            d, tip_number = tip_of[meeting.facing_tip]
+            first_there = (cracks[d].tips or ())[tip_number] == 0
+            if (d, first_there) in at_end:
                 continue
-            for key, row in (((c, first), meeting.tip), ((other, last), meeting.other)):
+            for key, row in (((c, first), meeting.tip), ((d, first_there), meeting.facing_tip)):
                 at_end[key] = meeting.x
                 crack = result[key[0]]
                 assert crack is not None
                 result[key[0]] = _with_new_end(crack, key[1], meeting.x, has_moved[row], False)
-            pairs.append(((c, first), (other, last), meeting.x))
+            pairs.append(((c, first), (d, first_there), meeting.x))
     number = list(range(len(cracks)))
-    for (c, _), (other, _), x in pairs:
-        low, high = sorted((number[c], number[other]))
-        if low == high:
+    for (c, _), (d, _), x in pairs:
+        k_min, k_max = sorted((number[c], number[d]))
+        if k_min == k_max:
             continue  # they are one crack by now: it closes, which placing refuses
-        first_crack, second_crack = result[low], result[high]
+        first_crack, second_crack = result[k_min], result[k_max]
         assert first_crack is not None
         assert second_crack is not None
-        result[low], result[high] = _crack_of_two(first_crack, second_crack, x), None
-        number = [low if n == high else n for n in number]
+        result[k_min], result[k_max] = _crack_of_two(first_crack, second_crack, x), None
+        number = [k_min if n == k_max else n for n in number]
     return [crack for crack in result if crack is not None]
 
 
@@ -286,11 +286,11 @@ def _with_new_end(crack: Crack, first: bool, x: Floats, replace: bool, drop: boo
     """A crack with another end, which is a tip no more where asked for."""
     points = crack.points[::-1] if first else crack.points
     points = np.concatenate([points[:-1] if replace and len(points) > 2 else points, x[None]])
-    last = len(points) - 1
+    end = len(points) - 1
     other_tips = [tip for tip in crack.tips or () if (tip == 0) != first]
-    tips = [0 if tip == 0 else last for tip in other_tips]
+    tips = [0 if tip == 0 else end for tip in other_tips]
     if not drop:
-        tips.append(0 if first else last)
+        tips.append(0 if first else end)
     return polyline_crack(points[::-1] if first else points, tuple(sorted(tips)))
 
 
@@ -335,8 +335,8 @@ def ends_on_others(cracks: Sequence[Crack]) -> list[tuple[int, int, Floats]]:
             if end in (crack.tips or ()):
                 continue
             x = crack.points[end]
-            for on, other in enumerate(cracks):
-                line = other.points
+            for on, crack_there in enumerate(cracks):
+                line = crack_there.points
                 if on == c or np.linalg.norm(line[[0, -1]] - x, axis=1).min() <= reach:
                     continue
                 foot = closest_on_segment(x, line[:-1], line[1:])

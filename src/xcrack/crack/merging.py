@@ -63,12 +63,12 @@ class FrontGap:
         return abs(self.turn) >= _TILT and self.offset <= STEP * size
 
 
-def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap | None:
+def gap_between(crack_a: Crack, crack_b: Crack, body: Body, reach: float) -> FrontGap | None:
     """Where the fronts of two cracks come closest in a body; None where farther than `reach`.
 
     Parameters
     ----------
-    one, other : Crack
+    crack_a, crack_b : Crack
         With fronts.
     body : Body
     reach : float, length
@@ -77,9 +77,9 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
     -------
     Gap or None
     """
-    best: FrontGap | None = None
-    ends = [_points_near(a, b, body, reach) for a, b in ((one, other), (other, one))]
-    for (x, normal), (y, normal_there), b in zip(ends, ends[::-1], (other, one), strict=True):
+    gap: FrontGap | None = None
+    ends = [_points_near(a, b, body, reach) for a, b in ((crack_a, crack_b), (crack_b, crack_a))]
+    for (x, normal), (y, normal_there), b in zip(ends, ends[::-1], (crack_b, crack_a), strict=True):
         if not len(x):
             continue
         tree = triangle_tree(b.points, b.faces)
@@ -97,20 +97,20 @@ def gap_between(one: Crack, other: Crack, body: Body, reach: float) -> FrontGap 
         normal_distance = np.einsum("ij,ij->i", way, normal[rows])
         offset = np.linalg.norm(way - normal_distance[:, None] * normal[rows], axis=1)
         k = int(np.argmin(offset))
-        if best is None or offset[k] < best.width:
-            best = FrontGap(
+        if gap is None or offset[k] < gap.width:
+            gap = FrontGap(
                 float(offset[k]),
                 float(abs(normal_distance[k])),
                 float(other_normal[k] @ normal[rows[k]]),
                 x[rows[k]] + way[k] / 2,
                 _is_on_front(b, feet[k], tree.distance_tolerance),
             )
-    return best
+    return gap
 
 
-def _points_near(crack: Crack, other: Crack, body: Body, reach: float) -> tuple[Floats, Floats]:
+def _points_near(crack: Crack, crack_b: Crack, body: Body, reach: float) -> tuple[Floats, Floats]:
     """Points close along fronts in a body, near the box of another crack, and normals `(n, 3)`."""
-    low, high = other.points.min(axis=0) - reach, other.points.max(axis=0) + reach
+    box_min, box_max = crack_b.points.min(axis=0) - reach, crack_b.points.max(axis=0) + reach
     parts = [np.zeros((0, 6))]
     for front in front_frames(crack):
         number = np.arange(len(front.x) + front.closed)
@@ -118,7 +118,7 @@ def _points_near(crack: Crack, other: Crack, body: Body, reach: float) -> tuple[
         corners = np.hstack([front.x, front.frame[:, 1]])[number % len(front.x)]
         parts.append(np.stack([np.interp(t, number, column) for column in corners.T], axis=1))
     points, normals = np.split(np.concatenate(parts), 2, axis=1)
-    rows = np.nonzero(((points >= low) & (points <= high)).all(axis=1))[0]
+    rows = np.nonzero(((points >= box_min) & (points <= box_max)).all(axis=1))[0]
     rows = rows[body.contains(points[rows])]
     return points[rows], unit(normals[rows])
 
@@ -137,8 +137,8 @@ def turned_crack(crack: Crack) -> Crack:
 
 
 def merged_crack(
-    one: Crack,
-    other: Crack,
+    crack_a: Crack,
+    crack_b: Crack,
     radius: float,
     size: float,
     step: float = 0.0,
@@ -148,7 +148,7 @@ def merged_crack(
 
     Parameters
     ----------
-    one, other : Crack
+    crack_a, crack_b : Crack
         With fronts that do not overlap; their normals agree where they are close.
     radius : float, length
         Of the disc that closes the gap.
@@ -171,20 +171,20 @@ def merged_crack(
         They do not lie in one surface, one encloses the other, or the gap has a shape that cannot
         be closed.
     """
-    n = len(one.points)
+    n = len(crack_a.points)
     shifted = Crack(
-        np.concatenate([one.points, other.points]),
-        other.faces + n,
+        np.concatenate([crack_a.points, crack_b.points]),
+        crack_b.faces + n,
         None,
-        tuple(front + n for front in other.fronts or ()),
+        tuple(front + n for front in crack_b.fronts or ()),
     )
-    both_cracks = Crack(shifted.points, np.concatenate([one.faces, shifted.faces]))
-    trees = tuple(triangle_tree(c.points, c.faces) for c in (other, one))
+    both_cracks = Crack(shifted.points, np.concatenate([crack_a.faces, shifted.faces]))
+    trees = tuple(triangle_tree(c.points, c.faces) for c in (crack_b, crack_a))
 
     def find_blocked(tree: TriangleTree) -> Callable[[Front], Bools]:
         return lambda front: _blocked_points(front, tree, radius, step)
 
-    facing_fronts = (front_frames(one), front_frames(shifted))
+    facing_fronts = (front_frames(crack_a), front_frames(shifted))
     flags = tuple(map(find_blocked, trees))
 
     if body is None:
@@ -321,9 +321,9 @@ def _with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) ->
     return replace(closed_crack, ends_on=crack.ends_on)
 
 
-def _faces(fronts: Sequence[Front], one: tuple[int, Ints], other: tuple[int, Ints]) -> bool:
+def _faces(fronts: Sequence[Front], p: tuple[int, Ints], q: tuple[int, Ints]) -> bool:
     """Whether two pieces of fronts look towards each other."""
-    (f, run), (g, run_of_other) = one, other
+    (f, run), (g, run_of_other) = p, q
     direction, opposite_direction = (
         fronts[f].frame[run, 0].mean(axis=0),
         fronts[g].frame[run_of_other, 0].mean(axis=0),
@@ -363,20 +363,20 @@ def through_holes(
     """
     follower = {int(b): int(a) for a, b in rim(crack.faces)[0]}
     pairs = []
-    for i, one in enumerate(fronts):
-        for j, other in enumerate(fronts):
-            if one.closed or other.closed:
+    for i, f in enumerate(fronts):
+        for j, g in enumerate(fronts):
+            if f.closed or g.closed:
                 continue
-            way = other.x[0] - one.x[-1]
+            way = g.x[0] - f.x[-1]
             gap = float(np.linalg.norm(way))
-            is_beside = follower.get(int(one.number[-1])) == int(other.number[0])
-            facing_share = min(one.frame[-1, 2] @ way, other.frame[0, 2] @ way)
+            is_beside = follower.get(int(f.number[-1])) == int(g.number[0])
+            facing_share = min(f.frame[-1, 2] @ way, g.frame[0, 2] @ way)
             if not is_beside and facing_share > _FACES * gap:
-                is_near = gap < _WIDE * float(body.cell_size(one.x[-1:])[0])
-                points_between = one.x[-1] + np.linspace(0.0, 1.0, 9)[:, None] * way
+                is_near = gap < _WIDE * float(body.cell_size(f.x[-1:])[0])
+                points_between = f.x[-1] + np.linspace(0.0, 1.0, 9)[:, None] * way
                 is_beside = is_near and not body.contains(points_between).any()
-            frame = one.frame[-1]
-            if is_beside and is_at_hole(one.x[-1] + way / 2, frame[0], frame[1], body):
+            frame = f.frame[-1]
+            if is_beside and is_at_hole(f.x[-1] + way / 2, frame[0], frame[1], body):
                 pairs.append((gap, i, j))
     next_front: dict[int, int] = {}
     for _, i, j in sorted(pairs):
@@ -431,9 +431,9 @@ def joined_fronts(crack: Crack, body: Body) -> Crack | None:
     rows = through_holes(crack, fronts, body)
     pairs_in_order = {pair for row, _ in rows for pair in zip(row, row[1:])}
     pairs_in_order |= {(row[-1], row[0]) for row, goes_round in rows if goes_round}
-    for i, one in enumerate(fronts):
-        for j, other in enumerate(fronts[: i + 1]):
-            pair = (one, other) if i != j else _thirds(one)
+    for i, f in enumerate(fronts):
+        for j, g in enumerate(fronts[: i + 1]):
+            pair = (f, g) if i != j else _thirds(f)
             if pair is None or (i, j) in pairs_in_order or (j, i) in pairs_in_order:
                 continue
             ends = _meeting_ends(*pair, body)
@@ -441,7 +441,7 @@ def joined_fronts(crack: Crack, body: Body) -> Crack | None:
             if meeting_place is None:
                 continue
             rest = [front for k, front in enumerate(fronts) if k not in (i, j)]
-            rest += [] if i != j else [_middle_of_front(one, *pair)]
+            rest += [] if i != j else [_middle_of_front(f, *pair)]
             return _join(crack, pair, rest, float(body.cell_size(meeting_place[None])[0]), body)
     return None
 
@@ -451,25 +451,25 @@ def _meets_in_hole(fronts: Sequence[Front], body: Body) -> bool:
     open_ones = [front for front in fronts if not front.closed]
     if not open_ones:
         return False
-    first, last = (np.array([front.x[end] for front in open_ones]) for end in (0, -1))
-    gap = np.linalg.norm(last[:, None] - first[None], axis=2)
-    i, j = np.nonzero(gap < _LOOSE * body.cell_size(last)[:, None])
+    first, last_x = (np.array([front.x[end] for front in open_ones]) for end in (0, -1))
+    gap = np.linalg.norm(last_x[:, None] - first[None], axis=2)
+    i, j = np.nonzero(gap < _LOOSE * body.cell_size(last_x)[:, None])
     normal = np.array([front.frame[-1, 1] for front in open_ones])
-    is_met = is_enclosed(last[i], normal[i], body) & is_enclosed(first[j], normal[i], body)
+    is_met = is_enclosed(last_x[i], normal[i], body) & is_enclosed(first[j], normal[i], body)
     return bool(is_met.any())
 
 
 def _thirds(front: Front) -> tuple[Front, Front] | None:
     """What lies at both ends of an open front."""
-    first, last = (int(np.searchsorted(front.s, part * front.s[-1] / 3)) for part in (1, 2))
-    if front.closed or first < 1 or last > len(front.x) - 2:
+    first, last_row = (int(np.searchsorted(front.s, part * front.s[-1] / 3)) for part in (1, 2))
+    if front.closed or first < 1 or last_row > len(front.x) - 2:
         return None
-    return _piece(front, slice(0, first + 1)), _piece(front, slice(last, None))
+    return _piece(front, slice(0, first + 1)), _piece(front, slice(last_row, None))
 
 
-def _middle_of_front(front: Front, first: Front, last: Front) -> Front:
+def _middle_of_front(front: Front, first: Front, last_piece: Front) -> Front:
     """An open front between the pieces at its ends."""
-    return _piece(front, slice(len(first.x) - 1, len(front.x) - len(last.x) + 1))
+    return _piece(front, slice(len(first.x) - 1, len(front.x) - len(last_piece.x) + 1))
 
 
 def _piece(front: Front, part: slice) -> Front:
@@ -488,43 +488,41 @@ def _ends_outside(front: Front, body: Body) -> list[tuple[int, int]]:
     return [(place, end) for place, end in end_places if not is_inside[end]]
 
 
-def _meeting_ends(one: Front, other: Front, body: Body) -> tuple[int, int, Floats] | None:
+def _meeting_ends(f: Front, g: Front, body: Body) -> tuple[int, int, Floats] | None:
     """Which ends at a hole have met behind it, so that no hole lies between them, and where."""
-    for p, first in _ends_outside(one, body):
-        for q, second in _ends_outside(other, body):
-            x, y = one.x[p], other.x[q]
+    for p, end in _ends_outside(f, body):
+        for q, end_there in _ends_outside(g, body):
+            x, y = f.x[p], g.x[q]
             size = float(body.cell_size(((x + y) / 2)[None])[0])
-            way = (y - x) if second == 0 else (x - y)  # as a front runs that goes on from one
+            way = (y - x) if end_there == 0 else (x - y)  # as a front runs that goes on from f
             gap = float(np.linalg.norm(way))
-            is_aligned = first != second and bool(one.frame[p, 1] @ other.frame[q, 1] > _ANGLE)
-            is_aligned &= min(one.frame[p, 2] @ way, other.frame[q, 2] @ way) > _FACES * gap
+            is_aligned = end != end_there and bool(f.frame[p, 1] @ g.frame[q, 1] > _ANGLE)
+            is_aligned &= min(f.frame[p, 2] @ way, g.frame[q, 2] @ way) > _FACES * gap
             if not is_aligned or gap > _WIDE * size:
                 continue
             points_between = x + np.linspace(0.0, 1.0, 9)[:, None] * (y - x)
             if body.contains(points_between).all():
-                return first, second, np.asarray((x + y) / 2)
+                return end, end_there, np.asarray((x + y) / 2)
     return None
 
 
-def _meeting_place(one: Front, other: Front, body: Body) -> Floats | None:
+def _meeting_place(f: Front, g: Front, body: Body) -> Floats | None:
     """Where two fronts in one surface are closer than about a cell, and lead to each other."""
-    rows = np.nonzero(body.contains(one.x))[0]
-    size = body.cell_size(one.x[rows])
-    if not len(rows) or not body.contains(other.x).any():
+    rows = np.nonzero(body.contains(f.x))[0]
+    size = body.cell_size(f.x[rows])
+    if not len(rows) or not body.contains(g.x).any():
         return None
-    r, segment, position = front_distance(
-        one.x[rows], other.x, other.closed, _NEAR * float(size.max())
-    )
+    r, segment, position = front_distance(f.x[rows], g.x, g.closed, _NEAR * float(size.max()))
     is_near = (segment >= 0) & (r < _NEAR * size) & (r > 0)
     rows, r, size = rows[is_near], r[is_near], size[is_near]
     segment, position = segment[is_near], position[is_near]
     if not len(rows):
         return None
-    t, next_point = position[:, None], (segment + 1) % len(other.x)
-    foot = (1 - t) * other.x[segment] + t * other.x[next_point]
-    frame = (1 - t[..., None]) * other.frame[segment] + t[..., None] * other.frame[next_point]
-    way = foot - one.x[rows]
-    direction, normal = one.frame[rows, 0], one.frame[rows, 1]
+    t, next_point = position[:, None], (segment + 1) % len(g.x)
+    foot = (1 - t) * g.x[segment] + t * g.x[next_point]
+    frame = (1 - t[..., None]) * g.frame[segment] + t[..., None] * g.frame[next_point]
+    way = foot - f.x[rows]
+    direction, normal = f.frame[rows, 0], f.frame[rows, 1]
     normal_distance = np.abs(np.einsum("ij,ij->i", way, normal))
     faces = np.einsum("ij,ij->i", way, direction) > _FACES * r
     faces &= np.einsum("ij,ij->i", way, frame[:, 0]) < -_FACES * r
@@ -534,7 +532,7 @@ def _meeting_place(one: Front, other: Front, body: Body) -> Floats | None:
     if not faces.any():
         return None
     k = int(np.argmin(np.where(faces, r / size, np.inf)))
-    return np.asarray(one.x[rows[k]] + way[k] / 2)
+    return np.asarray(f.x[rows[k]] + way[k] / 2)
 
 
 def _join(
@@ -547,11 +545,11 @@ def _join(
     ends = _nearest_ends(*pair, body)
 
     def find_blocked(k: int, fronts: tuple[Front, Front]) -> Callable[[Front], Bools]:
-        other = fronts[1 - k]
+        facing_front = fronts[1 - k]
 
         def is_ahead(front: Front) -> Bools:
             centre = front.x + radius * front.frame[:, 0]
-            r, segment, _ = front_distance(centre, other.x, other.closed, radius)
+            r, segment, _ = front_distance(centre, facing_front.x, facing_front.closed, radius)
             flag = (segment >= 0) & (r < radius * (1 - 1e-9))
             inner_rows = np.nonzero(body.contains(front.x))[0]
             if not front.closed:
@@ -574,19 +572,19 @@ def _join(
     return _first_that_closes(close_gap, (pair,))
 
 
-def _nearest_ends(one: Front, other: Front, body: Body) -> tuple[int, int] | None:
+def _nearest_ends(f: Front, g: Front, body: Body) -> tuple[int, int] | None:
     """Those ends of two fronts outside the body that lie in one hole, if any do."""
     pairs = [
-        (float(np.linalg.norm(one.x[p] - other.x[q])), first, second)
-        for p, first in _ends_outside(one, body)
-        for q, second in _ends_outside(other, body)
-        if first != second
+        (float(np.linalg.norm(f.x[p] - g.x[q])), end, end_there)
+        for p, end in _ends_outside(f, body)
+        for q, end_there in _ends_outside(g, body)
+        if end != end_there
     ]
     if not pairs:
         return None
-    gap, first, second = min(pairs)
-    size = float(body.cell_size(one.x[[first]])[0])
-    return (first, second) if gap < _LOOSE * size else None
+    gap, end, end_there = min(pairs)
+    size = float(body.cell_size(f.x[[end]])[0])
+    return (end, end_there) if gap < _LOOSE * size else None
 
 
 def _with_short_ends(front: Front, count: int, body: Body) -> Front:
@@ -616,8 +614,8 @@ def _with_gap_closed(
             "other: the gap between them cannot be closed."
         )
     points, faces = [crack.points], [crack.faces]
-    every = (*pair[0], *pair[1], *rest)
-    next_number = dict(side for front in every for side in _sides(front))
+    all_fronts = (*pair[0], *pair[1], *rest)
+    next_number = dict(side for front in all_fronts for side in _sides(front))
     count = len(crack.points)
     for front, run in runs:
         facing_run = other_runs.pop(_facing_number(front, run, other_runs))
@@ -680,15 +678,15 @@ def _runs(front: Front, is_blocked: Bools) -> list[FacingPart]:
         )
     result = []
     for run in runs_of(is_blocked) if front.closed else open_runs(is_blocked):
-        first, last = int(run[0]), int(run[-1])
+        first, end = int(run[0]), int(run[-1])
         if front.closed:
             count = len(run) + 2
             result.append(
                 FacingPart(tuple(int((first - 1 + k) % m) for k in range(count)), (False, False))
             )
             continue
-        ends = first == 0, last == m - 1
-        place = range(max(first - 1, 0), min(last + 1, m - 1) + 1)
+        ends = first == 0, end == m - 1
+        place = range(max(first - 1, 0), min(end + 1, m - 1) + 1)
         result.append(FacingPart(tuple(place), ends))
     return result
 
@@ -705,8 +703,8 @@ def _facing_number(
     """Number of the piece of the other crack's fronts that faces this one."""
     middle = front.x[list(run.place)].mean(axis=0)
     distances = [
-        float(np.linalg.norm(other.x[list(piece.place)].mean(axis=0) - middle))
-        for other, piece in other_runs
+        float(np.linalg.norm(front_there.x[list(piece.place)].mean(axis=0) - middle))
+        for front_there, piece in other_runs
     ]
     return int(np.argmin(distances))
 
@@ -714,7 +712,7 @@ def _facing_number(
 def _patch(
     front: Front,
     run: FacingPart,
-    other: Front,
+    front_there: Front,
     piece: FacingPart,
     radius: float,
     size: float,
@@ -725,25 +723,25 @@ def _patch(
     at_start = run.ends[0] or piece.ends[1]
     at_stop = run.ends[1] or piece.ends[0]
     if at_start:
-        a, b = _up_to_end(front, a, 0, radius), _up_to_end(other, b, -1, radius)
+        a, b = _up_to_end(front, a, 0, radius), _up_to_end(front_there, b, -1, radius)
     if at_stop:
-        a, b = _up_to_end(front, a, -1, radius), _up_to_end(other, b, 0, radius)
+        a, b = _up_to_end(front, a, -1, radius), _up_to_end(front_there, b, 0, radius)
     no_triangles = np.zeros((0, 3))
-    stop = no_triangles if at_stop else _arc(front, a[-1], other, b[0], size)
-    start = no_triangles if at_start else _arc(other, b[-1], front, a[0], size)
+    stop = no_triangles if at_stop else _arc(front, a[-1], front_there, b[0], size)
+    start = no_triangles if at_start else _arc(front_there, b[-1], front, a[0], size)
     stop_number = count + np.arange(len(stop))
     start_number = count + len(stop) + np.arange(len(start))
-    number = np.concatenate([front.number[a], stop_number, other.number[b], start_number])
-    x = np.concatenate([front.x[a], stop, other.x[b], start])
+    number = np.concatenate([front.number[a], stop_number, front_there.number[b], start_number])
+    x = np.concatenate([front.x[a], stop, front_there.x[b], start])
     # The front turns round where the pieces end: its way along an arc is against the outline.
     lines = []
     if not at_start:
-        lines.append([front.number[a[0]], *start_number[::-1], other.number[b[-1]]])
+        lines.append([front.number[a[0]], *start_number[::-1], front_there.number[b[-1]]])
     if not at_stop:
-        lines.append([other.number[b[0]], *stop_number[::-1], front.number[a[-1]]])
+        lines.append([front_there.number[b[0]], *stop_number[::-1], front.number[a[-1]]])
     sides = {int(p): int(q) for line in lines for p, q in zip(line, line[1:])}
-    used_numbers = np.concatenate([front.number[a[:-1]], other.number[b[:-1]]])
-    normal = np.concatenate([front.frame[a, 1], other.frame[b, 1]]).mean(axis=0)
+    used_numbers = np.concatenate([front.number[a[:-1]], front_there.number[b[:-1]]])
+    normal = np.concatenate([front.frame[a, 1], front_there.frame[b, 1]]).mean(axis=0)
     return _Patch(np.concatenate([stop, start]), number[_triangles(x, normal)], sides, used_numbers)
 
 
@@ -765,25 +763,25 @@ def _up_to_end(front: Front, place: list[int], end: int, radius: float) -> list[
     return rest + place if end == 0 else place + rest
 
 
-def _arc(one: Front, i: int, other: Front, j: int, size: float) -> Floats:
+def _arc(f: Front, i: int, g: Front, j: int, size: float) -> Floats:
     """Points between point i of one front and point j of another, tangential to both.
 
     The cubic of a circle that both fronts touch.
     """
-    first, last = one.x[i], other.x[j]
-    tangent_out, tangent_in = -one.frame[i, 2], other.frame[j, 2]
+    first_point, last_point = f.x[i], g.x[j]
+    tangent_out, tangent_in = -f.frame[i, 2], g.frame[j, 2]
     turn = float(np.arccos(np.clip(-(tangent_out @ tangent_in), -1.0, 1.0)))
-    chord = float(np.linalg.norm(last - first))
+    chord = float(np.linalg.norm(last_point - first_point))
     radius = chord / (2 * max(np.sin(turn / 2), 0.1))
     handle = 4 / 3 * np.tan(turn / 4) * radius if turn > 0.1 else chord / 3
     count = max(2, round(max(turn * radius, chord) / size))
     t = (np.arange(1, count) / count)[:, None]
-    second, third_point = first + handle * tangent_out, last + handle * tangent_in
+    second_point, third_point = first_point + handle * tangent_out, last_point + handle * tangent_in
     return np.asarray(
-        (1 - t) ** 3 * first
-        + 3 * t * (1 - t) ** 2 * second
+        (1 - t) ** 3 * first_point
+        + 3 * t * (1 - t) ** 2 * second_point
         + 3 * t**2 * (1 - t) * third_point
-        + t**3 * last
+        + t**3 * last_point
     )
 
 

@@ -57,17 +57,17 @@ def place_line(crack: Crack, mesh: Mesh) -> Crack:
         the boundary, leaves the body by a kink for less than a cell, or ends less than half a
         cell inside the boundary that it comes from.
     """
-    last = len(crack.points) - 1
+    last_point = len(crack.points) - 1
     first_time = crack.tips is None
-    candidates = (0, last) if crack.tips is None else crack.tips
+    candidates = (0, last_point) if crack.tips is None else crack.tips
     points = np.array(crack.points)
     length = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if first_time:
         _check_inside(points, mesh)
-    is_inside = contains(mesh, points[[0, last]])
+    is_inside = contains(mesh, points[[0, last_point]])
     tips = []
-    for end, is_end_inside in zip((0, last), is_inside.tolist()):
-        inner_point = 1 if end == 0 else last - 1
+    for end, is_end_inside in zip((0, last_point), is_inside.tolist()):
+        inner_point = 1 if end == 0 else last_point - 1
         direction = (points[end] - points[inner_point]) / np.linalg.norm(
             points[end] - points[inner_point]
         )
@@ -101,20 +101,20 @@ def _check_inside(points: Floats, mesh: Mesh) -> None:
     """Raise where no part of a crack lies in the body; warn where it leaves it by a kink."""
     parts = parts_inside(mesh, points)
     first = [piece[0, 0] if len(piece) else np.inf for piece in parts]
-    last = [piece[-1, 1] if len(piece) else -np.inf for piece in parts]
+    stop = [piece[-1, 1] if len(piece) else -np.inf for piece in parts]
     rows = [i for i, piece in enumerate(parts) if len(piece)]
     if not rows:
-        low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+        box_min, box_max = mesh.points.min(axis=0), mesh.points.max(axis=0)
         raise GeometryError(
             f"the crack from {points[0].tolist()} to {points[-1].tolist()} lies outside the body, "
-            f"which fills [{low.tolist()}, {high.tolist()}]: move it inside."
+            f"which fills [{box_min.tolist()}, {box_max.tolist()}]: move it inside."
         )
     for i, j in zip(rows, rows[1:]):
-        if last[i] == 1 and first[j] == 0 and j == i + 1:
+        if stop[i] == 1 and first[j] == 0 and j == i + 1:
             continue  # the vertex between lies in the body
         kinks = points[i + 1 : j + 1]
         ends = [
-            points[k] + t * (points[k + 1] - points[k]) for k, t in ((i, last[i]), (j, first[j]))
+            points[k] + t * (points[k + 1] - points[k]) for k, t in ((i, stop[i]), (j, first[j]))
         ]
         way = np.linalg.norm(np.diff([ends[0], *kinks, ends[1]], axis=0), axis=1).sum()
         chord = float(np.linalg.norm(ends[1] - ends[0]))
@@ -190,8 +190,8 @@ def vertices_on_mesh(crack: Crack, mesh: Mesh) -> Crack:
     cell, bary = locate(mesh, points)
     is_close = (cell >= 0) & (np.abs(bary) <= 2 * _BESIDE_MESH).any(axis=1)
     is_close[list(crack.tips or ())] = True
-    last = {0, len(points) - 1} - set(crack.tips or ())  # mouths, and ends on other cracks
-    for number in set(np.nonzero(is_close)[0].tolist()) - last:
+    end_numbers = {0, len(points) - 1} - set(crack.tips or ())  # mouths, and ends on other cracks
+    for number in set(np.nonzero(is_close)[0].tolist()) - end_numbers:
         points[number] = _on_mesh(points[number], mesh)
     return unchecked_copy(crack, points=lock(points))
 
@@ -273,19 +273,19 @@ def _check_flanks(number: int, cracks: tuple[Crack, ...], mesh: Mesh) -> None:
         return
     x, frame = tip_frames(cracks[number])
     for end, size, direction in zip(x, cell_sizes(mesh, x), frame[:, 0]):
-        for other, crack in enumerate(cracks):
-            if other == number:
+        for k, crack in enumerate(cracks):
+            if k == number:
                 continue
             foot = closest_on_segment(end, crack.points[:-1], crack.points[1:])
             distance = np.linalg.norm(foot - end, axis=1)
-            nearest = int(np.argmin(distance))
-            if (foot[nearest] - end) @ direction < _TOWARDS * distance[nearest]:
+            row = int(np.argmin(distance))
+            if (foot[row] - end) @ direction < _TOWARDS * distance[row]:
                 continue
-            if distance[nearest] < MOUTH * size and contains(mesh, foot[[nearest]])[0]:
+            if distance[row] < MOUTH * size and contains(mesh, foot[[row]])[0]:
                 raise CoarseMeshError(
-                    f"a tip of crack {number} at {at(end)} is {distance[nearest]:.4g} from crack "
-                    f"{other}, less than half a cell ({size:.4g}), but does not end on it: to let "
-                    f"it end there give a point of crack {other}, such as {at(foot[nearest])}, as "
+                    f"a tip of crack {number} at {at(end)} is {distance[row]:.4g} from crack "
+                    f"{k}, less than half a cell ({size:.4g}), but does not end on it: to let "
+                    f"it end there give a point of crack {k}, such as {at(foot[row])}, as "
                     "its end; else leave a few cells between, or refine the mesh there."
                 )
 
@@ -338,28 +338,28 @@ def _check_own(number: int, crack: Crack, mesh: Mesh) -> None:
         remaining_line = np.concatenate([begin[None], line[first + 1 :]])
         foot = closest_on_segment(end, remaining_line[:-1], remaining_line[1:])
         distance = np.linalg.norm(foot - end, axis=1)
-        nearest = int(np.argmin(distance))
-        if distance[nearest] < MOUTH * size:
+        row = int(np.argmin(distance))
+        if distance[row] < MOUTH * size:
             raise CoarseMeshError(
-                f"a tip of crack {number} at {at(end)} is {distance[nearest]:.4g} from another "
-                f"part of the same crack at {at(foot[nearest])}, less than half a cell "
+                f"a tip of crack {number} at {at(end)} is {distance[row]:.4g} from another "
+                f"part of the same crack at {at(foot[row])}, less than half a cell "
                 f"({size:.4g}): what lies between is all but cut out. End growth before, or refine "
                 f"the mesh there."
             )
 
 
 def _check_touch(
-    one: tuple[int, Crack],
-    other: tuple[int, Crack],
+    pair_a: tuple[int, Crack],
+    pair_b: tuple[int, Crack],
     meeting: tuple[Junction, ...],
     mesh: Mesh,
 ) -> None:
     """Raise where two cracks lie on each other in the body: they cross nowhere."""
-    (i, a), (j, b) = one, other
+    (i, a), (j, b) = pair_a, pair_b
     reach = _TOUCH * float(mesh.cell_size.max())
-    low = np.maximum(a.points.min(axis=0), b.points.min(axis=0)) - reach
-    high = np.minimum(a.points.max(axis=0), b.points.max(axis=0)) + reach
-    if (low > high).any():
+    box_min = np.maximum(a.points.min(axis=0), b.points.min(axis=0)) - reach
+    box_max = np.minimum(a.points.max(axis=0), b.points.max(axis=0)) + reach
+    if (box_min > box_max).any():
         return
     touching_places = touching_points(a.points, b.points, reach)
     touching_places = _points_off_junctions(touching_places, i, j, meeting, mesh)

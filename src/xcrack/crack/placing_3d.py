@@ -87,10 +87,10 @@ def rounded_surface(
     rim = np.zeros(len(points), dtype=bool)
     rim[np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)].ravel()] = True
     outline = np.concatenate(outlines)
-    inner = points[~rim]
-    inner = inner[_inner_points(inner, outline)]
+    inner_points = points[~rim]
+    inner_points = inner_points[_inner_points(inner_points, outline)]
     origin = points[faces[0, 0]]
-    return _triangles_within(outlines, inner, origin, plane)
+    return _triangles_within(outlines, inner_points, origin, plane)
 
 
 def _rounded_loop(x: Floats, loop: Ints, radius_at: dict[int, float]) -> Floats:
@@ -153,27 +153,27 @@ def _at(x: Floats, s: Floats, place: float) -> Floats:
     return np.asarray(x[j] + share * (x[(j + 1) % len(x)] - x[j]))
 
 
-def _inner_points(inner: Floats, outline: Floats) -> Bools:
+def _inner_points(points: Floats, outline: Floats) -> Bools:
     """Inner points not too close to the outline for well-shaped triangles."""
-    if not len(inner):
+    if not len(points):
         return np.zeros(0, dtype=bool)
-    distance, nearest = cKDTree(outline).query(inner)
+    distance, rows = cKDTree(outline).query(points)
     spacing = np.linalg.norm(outline - np.roll(outline, 1, axis=0), axis=1)
-    return np.asarray(distance > 0.6 * np.maximum(spacing, np.roll(spacing, -1))[nearest])
+    return np.asarray(distance > 0.6 * np.maximum(spacing, np.roll(spacing, -1))[rows])
 
 
 def _triangles_within(
-    outlines: list[Floats], inner: Floats, origin: Floats, plane: Floats
+    outlines: list[Floats], inner_points: Floats, origin: Floats, plane: Floats
 ) -> tuple[Floats, Ints]:
     """Triangles between outlines through the given inner points."""
     for _ in range(30):
-        points = np.concatenate([*outlines, inner])
+        points = np.concatenate([*outlines, inner_points])
         edges = _edges(outlines)
         plane_points = (points - origin) @ plane.T
-        if len(inner):
+        if len(inner_points):
             is_inside = is_within(plane_points, plane_points[edges])
-            is_inside[: len(points) - len(inner)] = True
-            inner = inner[is_inside[len(points) - len(inner) :]]
+            is_inside[: len(points) - len(inner_points)] = True
+            inner_points = inner_points[is_inside[len(points) - len(inner_points) :]]
             points, plane_points = points[is_inside], plane_points[is_inside]
         faces = Delaunay(plane_points).simplices.astype(np.int64)
         corner = plane_points[faces]
@@ -186,9 +186,9 @@ def _triangles_within(
             & is_within(corner.mean(axis=1), plane_points[edges])
         ]
         rim = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)[on_rim(faces)]
-        outer = {(int(b), int(a)) for a, b in rim}
-        is_missing = np.array([tuple(edge) not in outer for edge in edges.tolist()])
-        if not is_missing.any() and len(outer) == len(edges):
+        rim_sides = {(int(b), int(a)) for a, b in rim}
+        is_missing = np.array([tuple(edge) not in rim_sides for edge in edges.tolist()])
+        if not is_missing.any() and len(rim_sides) == len(edges):
             used_points, inverse = np.unique(faces, return_inverse=True)
             return points[used_points], inverse.reshape(-1, 3)
         is_present = np.isin(
@@ -345,8 +345,8 @@ def _check_apart_from_itself(crack: Crack, body: Body) -> None:
     for k in range(piece.max() + 1):
         used_points, inverse = np.unique(faces[piece == k], return_inverse=True)
         pieces.append(Crack(x[used_points], inverse.reshape(-1, 3), None))
-    for other, one in combinations(pieces, 2):
-        for place in meeting_points(one, other, body)[:1]:
+    for a, b in combinations(pieces, 2):
+        for place in meeting_points(b, a, body)[:1]:
             raise GeometryError(f"pieces of the surface crack meet near {at(place)}: {_PARTED}")
     middle, normal = x[faces].mean(axis=1), face_normals(x, faces)
     reach = (_OPPOSITE * body.cell_size(middle))[:, None] * normal
@@ -421,7 +421,7 @@ def arms_placed(
         return cracks
     check_numbers(given_cracks)
     result = [
-        replace(arm, ends_on=one.ends_on) for one, arm in zip(given_cracks, cracks, strict=True)
+        replace(arm, ends_on=crack.ends_on) for crack, arm in zip(given_cracks, cracks, strict=True)
     ]
     for c, crack in enumerate(given_cracks):
         if crack.ends_on and crack.fronts is None:
@@ -549,11 +549,11 @@ def _check_inside(crack: Crack, body: Body) -> None:
             f"the crack near {at(on_boundary[0])} lies on the boundary and cuts nothing: move it "
             "inside. If that is the symmetry plane of a half model, model both halves."
         )
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    box_min, box_max = mesh.points.min(axis=0), mesh.points.max(axis=0)
     at_low, at_high = crack.points.min(axis=0), crack.points.max(axis=0)
     raise GeometryError(
         f"the crack in [{at_low.tolist()}, {at_high.tolist()}] lies outside the body, which fills "
-        f"[{low.tolist()}, {high.tolist()}]: move it inside."
+        f"[{box_min.tolist()}, {box_max.tolist()}]: move it inside."
     )
 
 
@@ -683,8 +683,8 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
             meeting = meeting_points(cracks[i], crack, body)
             meeting = meeting[is_before(cracks, i, meeting) & is_before(cracks, j, meeting)]
             if len(meeting):
-                one, other = (_normal_at(each, meeting[:1]) for each in (cracks[i], crack))
-                if abs(float(one @ other)) > _FLUSH:
+                normal_a, normal_b = (_normal_at(c, meeting[:1]) for c in (cracks[i], crack))
+                if abs(float(normal_a @ normal_b)) > _FLUSH:
                     raise GeometryError(
                         f"cracks {i} and {j} lie on each other near {at(meeting[0])}: give both "
                         "as one surface, or leave out one that lies in the other."
@@ -753,15 +753,15 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
         )
 
 
-def meeting_points(one: Crack, other: Crack, body: Body) -> Floats:
+def meeting_points(crack_a: Crack, crack_b: Crack, body: Body) -> Floats:
     """Points inside the body where two surfaces cross or touch `(n, 3)`."""
-    low = np.maximum(one.points.min(axis=0), other.points.min(axis=0))
-    high = np.minimum(one.points.max(axis=0), other.points.max(axis=0))
-    if (low > high).any():
+    box_min = np.maximum(crack_a.points.min(axis=0), crack_b.points.min(axis=0))
+    box_max = np.minimum(crack_a.points.max(axis=0), crack_b.points.max(axis=0))
+    if (box_min > box_max).any():
         return np.zeros((0, 3))
-    parts = [crossings(one, other)]
+    parts = [crossings(crack_a, crack_b)]
     # Surfaces in one plane cross nothing, but lie on each other.
-    for a, b in ((one, other), (other, one)):
+    for a, b in ((crack_a, crack_b), (crack_b, crack_a)):
         x = np.concatenate([a.points, a.points[a.faces].mean(axis=1)])
         size = body.cell_size(x)
         nearest_point = closest_in(triangle_tree(b.points, b.faces), x, _TOUCH * float(size.max()))

@@ -237,16 +237,16 @@ def front_in_body(
     """
     rows_inside = np.nonzero(is_inside(np.array(x)))[0]
     whole_curve = front_curve(x, frame, is_closed)
-    curve, first, last = whole_curve, 0, len(x)
+    curve, first, stop = whole_curve, 0, len(x)
     if not is_closed:
-        first, last = _part_inside(x, rows_inside, is_inside)
-        if last - first < len(x):
-            curve = front_curve(x[first:last], frame[first:last], is_closed)
+        first, stop = _part_inside(x, rows_inside, is_inside)
+        if stop - first < len(x):
+            curve = front_curve(x[first:stop], frame[first:stop], is_closed)
     at = curve.breaks[rows_inside - first]
     ends = _way_inside(curve, is_inside) if len(rows_inside) else None
     number = rows_inside.astype(float)
     if not is_closed and ends is not None:
-        grid = np.arange(first, last, dtype=float)
+        grid = np.arange(first, stop, dtype=float)
         of_ends = np.interp(ends, curve.breaks, grid)
         is_new = np.array([number[0] - of_ends[0], of_ends[1] - number[-1]]) > _ON
         order = np.argsort(np.append(number, of_ends[is_new]), kind="stable")
@@ -268,14 +268,14 @@ def _part_inside(
     """
     if not len(rows_inside):
         return 0, len(x)
-    first, last = int(rows_inside[0]), int(rows_inside[-1])
-    next_rows = [min(max(k, 0), len(x) - 1) for k in (first - 1, last + 1)]
-    on = x[[first, last]] + _ON * (x[next_rows] - x[[first, last]])
+    first, last_row = int(rows_inside[0]), int(rows_inside[-1])
+    next_rows = [min(max(k, 0), len(x) - 1) for k in (first - 1, last_row + 1)]
+    on = x[[first, last_row]] + _ON * (x[next_rows] - x[[first, last_row]])
     goes_on = is_inside(on)
-    first, last = (
-        k if is_beyond else end for k, end, is_beyond in zip(next_rows, (first, last), goes_on)
+    first, last_row = (
+        k if is_beyond else end for k, end, is_beyond in zip(next_rows, (first, last_row), goes_on)
     )
-    return (first, last + 1) if last > first else (0, len(x))
+    return (first, last_row + 1) if last_row > first else (0, len(x))
 
 
 def _way_inside(
@@ -289,9 +289,9 @@ def _way_inside(
     if not len(rows_inside):
         return None
     ends = []
-    for last, step in ((int(rows_inside[0]), -1), (int(rows_inside[-1]), 1)):
-        s_inside = s[last]
-        s_outside = s[min(max(last + step, 0), _SAMPLES)]
+    for row, step in ((int(rows_inside[0]), -1), (int(rows_inside[-1]), 1)):
+        s_inside = s[row]
+        s_outside = s[min(max(row + step, 0), _SAMPLES)]
         for _ in range(30 if s_outside != s_inside else 0):
             middle = (s_inside + s_outside) / 2
             if is_inside(curve.at(np.array([middle]))[0])[0]:

@@ -109,34 +109,34 @@ def elliptic_crack(
     return _disc(middle, x * a, y * b, n)
 
 
-def _disc(center: Floats, first: Floats, second: Floats, n: int) -> Crack:
+def _disc(center: Floats, first_axis: Floats, second_axis: Floats, n: int) -> Crack:
     """Disc spanned by two conjugate half-axes, in rings whose points become half as many."""
     rings = [(n, 1.0)]
     while rings[-1][0] % 2 == 0 and rings[-1][0] >= 2 * _FEWEST:
         count, radius = rings[-1]
         side = 2 * np.pi * radius / count
         # The inner side is twice as long as the outer one, the height between both.
-        inner = max(radius - 1.4 * side, radius / 2)
-        rings.append((count // 2, inner))
+        inner_radius = max(radius - 1.4 * side, radius / 2)
+        rings.append((count // 2, inner_radius))
     points, faces = [], []
     begin = 0
     for k, (count, radius) in enumerate(rings):
         turns = np.arange(count) / count
         points.append(
             center
-            + radius * _cosine(turns)[:, None] * first
-            + radius * _cosine(turns - 0.25)[:, None] * second
+            + radius * _cosine(turns)[:, None] * first_axis
+            + radius * _cosine(turns - 0.25)[:, None] * second_axis
         )
         i = np.arange(count)
-        outer = begin + i
+        ring = begin + i
         if k == len(rings) - 1:
             middle = np.full(count, begin + count)
-            faces.append(np.stack([outer, begin + (i + 1) % count, middle], axis=1))
+            faces.append(np.stack([ring, begin + (i + 1) % count, middle], axis=1))
         else:
             half = np.arange(count // 2)
             inner_now = begin + count + half
             inner_next = begin + count + (half + 1) % (count // 2)
-            even_points, odd_points = outer[::2], outer[1::2]
+            even_points, odd_points = ring[::2], ring[1::2]
             next_even = np.roll(even_points, -1)
             faces.append(np.stack([even_points, odd_points, inner_now], axis=1))
             faces.append(np.stack([odd_points, inner_next, inner_now], axis=1))
@@ -194,15 +194,15 @@ def plane_crack(polygon: Annotated[ArrayLike, Points((None, 3))]) -> Crack:
             f"corners {i} and {(i + 1) % len(x)} of the plane crack both lie at {x[i].tolist()}: "
             "leave one out (the first corner is not repeated at the end)."
         )
-    local = x - x.mean(axis=0)
-    vector = np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
+    offset = x - x.mean(axis=0)
+    vector = np.cross(offset, np.roll(offset, -1, axis=0)).sum(axis=0)
     if np.linalg.norm(vector) <= 1e-12 * size**2:
         raise GeometryError(
             f"the plane crack at {at(x[0])} has no area: its corners lie on a "
             "line, or the polygon crosses itself; give them in order around the crack."
         )
     normal = vector / np.linalg.norm(vector)
-    height = local @ normal
+    height = offset @ normal
     if np.abs(height).max() > _FLAT * size:
         i = int(np.argmax(np.abs(height)))
         raise GeometryError(
@@ -212,7 +212,7 @@ def plane_crack(polygon: Annotated[ArrayLike, Points((None, 3))]) -> Crack:
     first_axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
     first_axis = np.cross(np.cross(normal, first_axis), normal)
     first_axis /= np.linalg.norm(first_axis)
-    plane_points = np.stack([local @ first_axis, local @ np.cross(normal, first_axis)], axis=1)
+    plane_points = np.stack([offset @ first_axis, offset @ np.cross(normal, first_axis)], axis=1)
     crossing = self_crossing(plane_points)
     if crossing is not None:
         i, j = crossing

@@ -229,7 +229,7 @@ def _step_to_meeting(
 
     def distance_left(meeting: Meeting, length: float) -> float:
         place = stations.x + _growth(stations, stretch, length).move
-        to = meeting.x if meeting.other < 0 else place[meeting.other]
+        to = meeting.x if meeting.facing_tip < 0 else place[meeting.facing_tip]
         return float((to - place[meeting.tip]) @ directions[meeting.tip])
 
     largest_length = plan.length + max(AHEAD * meeting.size for meeting in meetings_ahead)
@@ -281,14 +281,14 @@ def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> t
     K rises faster in a closing gap than polynomials through earlier solves: the cycles are those
     of two equal cracks that face each other, and the other tips grow for as long.
     """
-    facing_pairs = [meeting for meeting in meetings_now if meeting.other >= 0]
+    facing_pairs = [meeting for meeting in meetings_now if meeting.facing_tip >= 0]
     if not facing_pairs or step.zones is not None:
         return growth, 0.0
     stations, solves = solves_of(step)
     rate, m, radius = solves.rate[-1], solves.exponent, _radii(step)
     best_estimate = growth.cycles, 0.0
     for meeting in facing_pairs:
-        i, k = meeting.tip, meeting.other
+        i, k = meeting.tip, meeting.facing_tip
         gap, speed = float(np.linalg.norm(stations.x[k] - stations.x[i])), float(rate[i] + rate[k])
         if speed <= 0:
             continue
@@ -300,7 +300,7 @@ def _as_gap_closes(step: Step, growth: Growth, meetings_now: list[Meeting]) -> t
     share = cycles / growth.cycles if growth.cycles > 0 else 1.0
     is_meeting = np.isin(
         np.arange(len(rate)),
-        [row for meeting in facing_pairs for row in (meeting.tip, meeting.other)],
+        [row for meeting in facing_pairs for row in (meeting.tip, meeting.facing_tip)],
     )
     part = np.where(is_meeting, 1.0, share)
     return Growth(part[:, None] * growth.move, part * growth.arc, cycles), cycle_error

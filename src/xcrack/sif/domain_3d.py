@@ -519,7 +519,7 @@ def _lip_part(
     feet = _as_seen(solutions[0], t, near_points, feet)
     pressure = np.stack([lip_pressure(solution, c)[near_points] for solution in solutions], axis=-1)
     is_inside = feet.r < outer
-    height = np.abs(feet.local[is_inside, 1]).max(initial=0.0)
+    height = np.abs(feet.offset[is_inside, 1]).max(initial=0.0)
     is_bent = height > 1e-9 * outer
     traction = lips.normal[near_points][:, :, None] * pressure[:, None]
     for k, shear in enumerate(lip_shear(solution, c) for solution in solutions):
@@ -562,11 +562,11 @@ def _as_seen(solution: Solution, t: int, rows: Ints, feet: FootPoints) -> FootPo
     corner = space.mesh.cells[lips.cell[rows, 1]]
     psi = space.cuts[tip.crack].level_set.psi[tip.number][corner]
     psi_of_lips = np.einsum("qb,qb->q", lips.bary[rows, 1], psi)
-    local = np.array(feet.local)
+    local = np.array(feet.offset)
     # Out of reach of the tube psi has only a sign.
     is_within = np.abs(psi_of_lips - local[:, 0]) < tip.radius
     local[is_within, 0] = psi_of_lips[is_within]
-    return replace(feet, local=local)
+    return replace(feet, offset=local)
 
 
 def _on_lip(solution: Solution, c: int, rows: Ints, s: int, sign: int) -> tuple[Ints, Floats, Ints]:

@@ -229,7 +229,7 @@ def domain_integrals(
 
     states = gradient.shape[3]
     total = np.zeros((states, radii.shape[1], 3, len(knots)))
-    r, theta = continued_polar(feet.local, side, is_behind)
+    r, theta = continued_polar(feet.offset, side, is_behind)
     hat, share, step = hats(curve, knots, feet.s)
     foot_stress, change = _initial_stress(curve, feet, initial_stress, states)
     if stress_change is not None:
@@ -267,7 +267,7 @@ def _initial_stress(
     if initial_stress is None:
         return np.zeros((0, 3, 3, states)), np.zeros((0, 3, 3, states))
     at_foot = curve.at(feet.s)[0]
-    x = at_foot + np.einsum("qa,qad->qd", feet.local, feet.frame[:, :2])
+    x = at_foot + np.einsum("qa,qad->qd", feet.offset, feet.frame[:, :2])
     foot_stress = np.ascontiguousarray(initial_stress(at_foot))
     return foot_stress, np.ascontiguousarray(initial_stress(x) - foot_stress)
 
@@ -311,7 +311,7 @@ def lip_integrals(
     (n, k, 3, p) array
     """
     # What is flat is so but for round-off, which 1 / r would magnify.
-    local = np.array(feet.local)
+    local = np.array(feet.offset)
     local[np.abs(local[:, 1]) < _FLAT * radii.max(), 1] = 0.0
     feet = FootPoints(feet.s, local, feet.frame, feet.turn)
     every = np.ones(len(weight), dtype=bool)
@@ -367,7 +367,7 @@ def side_integrals(
     if not len(weight):
         return total
     hat, share, _ = hats(curve, knots, feet.s)
-    r, theta = continued_polar(feet.local, side, is_behind)
+    r, theta = continued_polar(feet.offset, side, is_behind)
     foot_stress, _ = _initial_stress(curve, feet, initial_stress, states)
     surface_terms(
         np.ascontiguousarray(weight),

@@ -93,7 +93,7 @@ def sides_around(
                  for n in ("cell", "bary", "weight", "side"))),
         np.concatenate([part.normal for part in parts]),
         FootPoints(*(np.concatenate([getattr(one, n) for one in feet])
-                     for n in ("s", "local", "frame", "turn"))),
+                     for n in ("s", "offset", "frame", "turn"))),
         np.concatenate([part.reaction for part in parts]),
         np.concatenate([part.is_smooth for part in parts]),
     )  # fmt: skip

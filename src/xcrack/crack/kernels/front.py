@@ -10,29 +10,29 @@ from xcrack.base.kernels.jit import kernel
 @kernel
 def _piece_of(s, break_arcs, guess):  # type: ignore[no-untyped-def]
     """Piece of a spline in which a parameter lies, first or last beyond its ends."""
-    low, high = 0, len(break_arcs) - 2
+    begin, end = 0, len(break_arcs) - 2
     if break_arcs[guess] <= s < break_arcs[guess + 1]:
         return guess
-    while low < high:
-        middle = (low + high + 1) // 2
+    while begin < end:
+        middle = (begin + end + 1) // 2
         if break_arcs[middle] <= s:
-            low = middle
+            begin = middle
         else:
-            high = middle - 1
-    return low
+            end = middle - 1
+    return begin
 
 
 @kernel
-def _curve_at(s, low, break_arcs, place, value, slope, bend):  # type: ignore[no-untyped-def]
+def _curve_at(s, piece, break_arcs, place, value, slope, bend):  # type: ignore[no-untyped-def]
     """Value and two derivatives of a cubic spline; coefficients as of scipy, highest first.
 
     Straight beyond its ends.
     """
     clamped_s = min(max(s, break_arcs[0]), break_arcs[-1])
-    t, excess = clamped_s - break_arcs[low], s - clamped_s
+    t, excess = clamped_s - break_arcs[piece], s - clamped_s
     for i in range(3):
-        c3, c2 = place[0, low, i], place[1, low, i]
-        c1, c0 = place[2, low, i], place[3, low, i]
+        c3, c2 = place[0, piece, i], place[1, piece, i]
+        c1, c0 = place[2, piece, i], place[3, piece, i]
         value[i] = ((c3 * t + c2) * t + c1) * t + c0
         slope[i] = (3 * c3 * t + 2 * c2) * t + c1
         bend[i] = 6 * c3 * t + 2 * c2
@@ -123,19 +123,19 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
     -------
     s : (q,) array
         Parameter of the foot.
-    local : (q, 2) array
+    offset : (q, 2) array
         Coordinates along t and n.
     frame : (q, 3, 3) array
     turn : (q, 4) array
         As of `frames_at`.
     """
     count = len(x)
-    s, local = np.empty(count), np.empty((count, 2))
+    s, offset = np.empty(count), np.empty((count, 2))
     frame, turn = np.empty((count, 3, 3)), np.empty((count, 4))
     X, dX, ddX = np.empty(3), np.empty(3), np.empty(3)
     N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
-    first, last = break_arcs[0], break_arcs[-1]
-    period = last - first
+    first, end = break_arcs[0], break_arcs[-1]
+    period = end - first
     piece = 0
     for q in range(count):
         u = start[q]
@@ -151,14 +151,14 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
             df = square - df
             is_newton = df > 0.1 * square
             step = f / (df if is_newton else square)
-            if is_closed or first <= u <= last:  # straight beyond its ends: any step is right
+            if is_closed or first <= u <= end:  # straight beyond its ends: any step is right
                 step = min(max(step, -reach), reach)
             previous_u = u
             u += step
             if is_closed:
                 if u < first:
                     u += period
-                elif u > last:
+                elif u > end:
                     u -= period
             # A step of Newton's leaves about its square.
             if abs(step) <= (1e-9 if is_newton else 1e-14) * period or u == previous_u:
@@ -173,8 +173,8 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
             gap = x[q, i] - X[i]
             x1 += gap * frame[q, 0, i]
             x2 += gap * frame[q, 1, i]
-        local[q, 0], local[q, 1] = x1, x2
-    return s, local, frame, turn
+        offset[q, 0], offset[q, 1] = x1, x2
+    return s, offset, frame, turn
 
 
 @kernel
@@ -238,11 +238,11 @@ def _weight(r, radius):  # type: ignore[no-untyped-def]
 @kernel
 def _largest_radius(radii, hat):  # type: ignore[no-untyped-def]
     """Largest radius of two hats."""
-    largest = 0.0
+    radius = 0.0
     for side in range(2):
         for k in range(radii.shape[1]):
-            largest = max(largest, radii[hat[side], k])
-    return largest
+            radius = max(radius, radii[hat[side], k])
+    return radius
 
 
 @kernel
@@ -250,11 +250,11 @@ def _into_frame(frame, tensor, result):  # type: ignore[no-untyped-def]
     """Components of a tensor along the rows of a frame."""
     for a in range(3):
         x, y, z = frame[a, 0], frame[a, 1], frame[a, 2]
-        first = x * tensor[0, 0] + y * tensor[1, 0] + z * tensor[2, 0]
-        second = x * tensor[0, 1] + y * tensor[1, 1] + z * tensor[2, 1]
-        third_value = x * tensor[0, 2] + y * tensor[1, 2] + z * tensor[2, 2]
+        c0 = x * tensor[0, 0] + y * tensor[1, 0] + z * tensor[2, 0]
+        c1 = x * tensor[0, 1] + y * tensor[1, 1] + z * tensor[2, 1]
+        c2 = x * tensor[0, 2] + y * tensor[1, 2] + z * tensor[2, 2]
         for b in range(3):
-            result[a, b] = first * frame[b, 0] + second * frame[b, 1] + third_value * frame[b, 2]
+            result[a, b] = c0 * frame[b, 0] + c1 * frame[b, 1] + c2 * frame[b, 2]
 
 
 @kernel
