@@ -47,8 +47,8 @@ def function_nodes(space: FunctionSpace) -> Ints:
         owner[number[nodes]] = nodes
     for tip in space.tips:
         points = np.nonzero(tip.point_to_function >= 0)[0]
-        each = tip.point_to_function[points][:, None] + np.arange(tip.functions)
-        owner[each] = points[:, None]
+        tip_functions = tip.point_to_function[points][:, None] + np.arange(tip.functions)
+        owner[tip_functions] = points[:, None]
     return owner
 
 

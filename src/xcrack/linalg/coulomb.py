@@ -332,11 +332,11 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
 def _newton_on_cones(
     rows: FrictionRows, d: Floats, guess: FrictionStart
 ) -> tuple[FrictionState | None, int]:
-    previous_lam, last = np.full(len(d), np.inf), np.inf
+    previous_lam, previous_change = np.full(len(d), np.inf), np.inf
     for sets in range(1, _MOST_CONES + 1):
         lam, gap = _linearised_solution(rows, d, guess)
         next_guess = _next_status(rows, lam, gap)
-        largest = float(np.abs(lam).max(initial=0.0))
+        largest_traction = float(np.abs(lam).max(initial=0.0))
         change = float(np.abs(lam - previous_lam).max(initial=0.0)) if sets > 1 else np.inf
         same_status = np.array_equal(next_guess.closed, guess.closed) and np.array_equal(
             next_guess.direction.any(axis=0), guess.direction.any(axis=0)
@@ -344,13 +344,13 @@ def _newton_on_cones(
         direction_change = next_guess.direction - guess.direction
         bound = rows.mu * np.maximum(lam[: rows.n], 0.0)[rows.rubbing_rows]
         error = float(np.abs(bound * direction_change).max(initial=0.0))
-        is_settled = error <= _CHANGE * largest
-        is_stalled = error <= _STALL * largest and change >= 0.5 * last
+        is_settled = error <= _CHANGE * largest_traction
+        is_stalled = error <= _STALL * largest_traction and change >= 0.5 * previous_change
         if same_status and (is_settled or is_stalled):
             return FrictionState(
                 lam, gap, Status(next_guess.closed, next_guess.direction), sets
             ), sets
-        previous_lam, last, guess = lam, change, next_guess
+        previous_lam, previous_change, guess = lam, change, next_guess
     return None, _MOST_CONES
 
 
@@ -382,10 +382,10 @@ def _linearised_solution(
     is_sliding = np.asarray(guess.direction.any(axis=0))[touching_rows]
     if len(active_rows):
         diagonal = rows.F.diagonal()
-        one = np.concatenate(
+        diagonal_rows = np.concatenate(
             [closed_rows, g + touching_rows, g + touching_rows]
         )  # one scale for both tangents
-        size = diagonal[one]
+        size = diagonal[diagonal_rows]
         scale = np.where(size > 0, 1 / np.sqrt(np.where(size > 0, size, 1.0)), 0.0)
         A = rows.F[np.ix_(active_rows, active_rows)] * scale[:, None] * scale
         b = -d[active_rows] * scale
@@ -408,23 +408,23 @@ def _put_slip_conditions(
     x_t - mu s x_n - share (1 - s s') (x_t - k (A x - b)_t) = 0.
     """
     m, n = len(closed_rows), len(touching_rows)
-    chosen = np.nonzero(is_sliding)[0]
-    if not len(chosen):
+    sliding_rows = np.nonzero(is_sliding)[0]
+    if not len(sliding_rows):
         return
     place = np.zeros(rows.n, dtype=np.int64)
     place[closed_rows] = np.arange(m)
-    number = touching_rows[chosen]
+    number = touching_rows[sliding_rows]
     s, share, mu = guess.direction[:, number], guess.share[number], rows.mu[number]
-    t = [m + chosen, m + n + chosen]
+    t = [m + sliding_rows, m + n + sliding_rows]
     column = place[rows.rubbing_rows[number]]
     scale_of_slip = np.array([scale[t[0]], scale[t[1]]])
     weight = (rows.stiffness / rows.measure)[rows.rubbing_rows[number]]
     slip = np.stack([A[t[0]] / scale_of_slip[0][:, None], A[t[1]] / scale_of_slip[1][:, None]])
     free_gap = np.stack([b[t[0]] / scale_of_slip[0], b[t[1]] / scale_of_slip[1]])
-    line = np.arange(len(chosen))
+    line = np.arange(len(sliding_rows))
     for i in (0, 1):
-        row = np.zeros((len(chosen), A.shape[1]))
-        rhs = np.zeros(len(chosen))
+        row = np.zeros((len(sliding_rows), A.shape[1]))
+        rhs = np.zeros(len(sliding_rows))
         row[line, t[i]] += scale_of_slip[i]
         row[line, column] -= mu * s[i] * scale[column]
         for j in (0, 1):

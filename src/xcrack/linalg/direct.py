@@ -411,8 +411,8 @@ def _reduced_columns(
         enriched_part = coupling_of_rows @ tip_columns
         enriched_part.sort_indices()
         parts = (
-            (each.indptr, each.indices, each.data)
-            for each in (tip_columns, coupling, coupling_of_rows, enriched_part)
+            (part.indptr, part.indices, part.data)
+            for part in (tip_columns, coupling, coupling_of_rows, enriched_part)
         )
         matrix, columns, energy = bordered_matrix(
             K.indptr, K.indices, K.data, *parts, is_fixed, first
@@ -449,9 +449,9 @@ def _enriched_columns(
             K, restrict_blocks(node_blocks(space, numerics.orthonormal), is_free)
         )
     else:
-        chosen = first + np.nonzero(is_free[first:])[0]
-        unit_entries = (np.ones(len(chosen)), (chosen, np.arange(len(chosen))))
-        Z = sp.csr_matrix(unit_entries, shape=(n, len(chosen)))
+        free_unknowns = first + np.nonzero(is_free[first:])[0]
+        unit_entries = (np.ones(len(free_unknowns)), (free_unknowns, np.arange(len(free_unknowns))))
+        Z = sp.csr_matrix(unit_entries, shape=(n, len(free_unknowns)))
     return Z if change is None else sp.csr_matrix(change @ Z)
 
 

@@ -103,8 +103,8 @@ class SolverState:
         centres, closed_sets = self.centre[c], self.active[c]
         if centres is None or closed_sets is None or state >= len(closed_sets) or not len(centres):
             return None
-        nearest = cKDTree(centres).query(centre)[1]
-        return np.asarray(closed_sets[state][nearest])
+        nearest_rows = cKDTree(centres).query(centre)[1]
+        return np.asarray(closed_sets[state][nearest_rows])
 
 
 @dataclass

@@ -113,10 +113,10 @@ class Parts:
             row_blocks([self.coupling.T.tocsr(), self.enriched_block], first),
         )
 
-    def entries(self, chosen: Ints) -> sp.csr_matrix:
+    def entries(self, unknowns: Ints) -> sp.csr_matrix:
         """Entries between free unknowns, given sorted."""
         n = len(self.body_unknowns)
-        standard, enriched_numbers = chosen[chosen < n], chosen[chosen >= n] - n
+        standard, enriched_numbers = unknowns[unknowns < n], unknowns[unknowns >= n] - n
         standard_entries = self.body_unknowns[standard]
         coupling = self.coupling[standard][:, enriched_numbers]
         parts = [
@@ -227,7 +227,7 @@ class IterativeSystem:
             np.zeros_like(columns) if u_imposed is None else u_imposed.reshape(columns.shape)
         )
         b, known_of = _vectors(self._loads_on_unknowns(columns, u_columns)), _vectors(u_columns)
-        y: list[Floats] = [np.zeros_like(each) for each in b]
+        y: list[Floats] = [np.zeros_like(load) for load in b]
         if start is not None:
             y = _vectors(self.coordinates(start.reshape(columns.shape) - u_columns))
         first = independent_columns(b)
@@ -265,16 +265,16 @@ class IterativeSystem:
         rows_in_basis = sp.csr_matrix(rows.N @ self.basis)
         b = _vectors(self._loads_on_unknowns(f, u_imposed))
         gaps = _vectors(rows.N @ u_imposed)
-        y = [np.zeros_like(each) for each in b]
+        y = [np.zeros_like(load) for load in b]
         if last_solution is not None:
             y = _vectors(self.coordinates(last_solution - u_imposed))
         # What a pressure closes, a multiple of the load closes too, and nothing else.
         right_hand_sides = np.concatenate([np.stack(b, axis=1), u_imposed])
         row_alike, scale = proportional_columns(right_hand_sides, _MULTIPLE)
         states: dict[int, ProjectedState] = {}
-        for chosen in _in_turn(row_alike, scale):
+        for state_numbers in _in_turn(row_alike, scale):
             runs = []
-            for k in chosen:
+            for k in state_numbers:
                 model = states.get(int(row_alike[k]))
                 first = start[k]
                 if model is not None:
@@ -284,7 +284,7 @@ class IterativeSystem:
                 runs.append(
                     self._solve_with_rows(b[k], u_imposed[:, k], conditions, is_active, y[k])
                 )
-            for k, state in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+            for k, state in zip(state_numbers, in_lockstep(self.operator, runs), strict=True):
                 states[k] = state
                 self._count_steps(state.iterations)
         return [
@@ -315,15 +315,15 @@ class IterativeSystem:
 
     def _solve_apart(
         self,
-        chosen: Sequence[int],
+        state_numbers: Sequence[int],
         b: Sequence[Floats],
         u_imposed: Sequence[Floats],
         y: list[Floats],
         tolerance: float,
     ) -> None:
         """Put solutions of some states in the place of their guesses."""
-        runs = [self._solve_by_column(b[k], u_imposed[k], y[k], tolerance) for k in chosen]
-        for k, (column, steps) in zip(chosen, in_lockstep(self.operator, runs), strict=True):
+        runs = [self._solve_by_column(b[k], u_imposed[k], y[k], tolerance) for k in state_numbers]
+        for k, (column, steps) in zip(state_numbers, in_lockstep(self.operator, runs), strict=True):
             y[k] = column
             self._count_steps(steps)
 
@@ -503,15 +503,15 @@ def _star_orthogonal_basis(
 
 def independent_columns(vectors: Sequence[Floats]) -> list[int]:
     """Those that are no combination of others before them, nearly."""
-    chosen, directions = [], list[Floats]()
+    columns, directions = [], list[Floats]()
     for k, vector in enumerate(vectors):
         residual, size = vector.copy(), _norm(vector)
         for q in directions * 2:  # twice: what is left of nearly parallel vectors is small
             residual -= np.einsum("i,i", q, residual) * q
         if not _norm(residual) <= _NEARLY * size:
-            chosen.append(k)
+            columns.append(k)
             directions.append(residual / _norm(residual))
-    return chosen
+    return columns
 
 
 def _norm(vector: Floats) -> float:

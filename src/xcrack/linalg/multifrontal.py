@@ -289,11 +289,11 @@ def _factor_subtrees(
     square = np.zeros(len(place), dtype=np.uint64)
     free_rooms: list[Floats] = []
 
-    def factor(chosen: Bools, begin: int, end: int, room: Floats) -> int:
+    def factor(part_mask: Bools, begin: int, end: int, room: Floats) -> int:
         square[begin:end] = np.where(
-            chosen[begin:end], room.ctypes.data + 8 * place[begin:end], square[begin:end]
+            part_mask[begin:end], room.ctypes.data + 8 * place[begin:end], square[begin:end]
         )
-        return int(factor_parts(fronts, panel, update, square, is_packed, chosen, begin, end))
+        return int(factor_parts(fronts, panel, update, square, is_packed, part_mask, begin, end))
 
     def subtree(root: int) -> int:
         begin, end = root + 2 - (2 << level), root + 1
@@ -340,6 +340,6 @@ def _parts_to_factor(
         p = np.unique(p[p > 1] >> 1)
     # A unit's root stands for all of it.
     ancestors = order.copy()
-    low = height < lowest_height
-    steps = np.where(low, lowest_height - height, 0)
+    is_low = height < lowest_height
+    steps = np.where(is_low, lowest_height - height, 0)
     return np.asarray(chosen_parts[rank[ancestors >> steps]])

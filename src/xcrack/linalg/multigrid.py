@@ -105,7 +105,7 @@ def star_patches(
     inverse, offset = _inverses(matrix_entries(members_in_use), place, start)
     inverse_of_others = (1 / diagonal).astype(np.float32)
     inverse_of_others[members_in_use] = 0
-    short_arrays = [each.astype(np.uint32) for each in (members, start)]
+    short_arrays = [array.astype(np.uint32) for array in (members, start)]
     return Patches(*map(lock, (*short_arrays, offset, inverse, inverse_of_others)))
 
 
@@ -134,9 +134,9 @@ def _inverses(A: sp.csr_matrix, members: Ints, start: Ints) -> tuple[Any, Any]:
     result = np.empty(offset[-1], np.float32)
     blocks_in_row = dense_blocks(A.indptr, A.indices, A.data, members, start)
     for s in np.unique(size):
-        where = offset[:-1][size == s][:, None] + np.arange(s * s)
-        inverse = _stable_inverses(blocks_in_row[where].reshape(-1, s, s))
-        result[where] = inverse.reshape(-1, s * s)
+        entries = offset[:-1][size == s][:, None] + np.arange(s * s)
+        inverse = _stable_inverses(blocks_in_row[entries].reshape(-1, s, s))
+        result[entries] = inverse.reshape(-1, s * s)
     return result, offset[:-1].astype(np.uint64)
 
 
@@ -254,8 +254,8 @@ def _smooth(level: GridLevel, r: Any, x: Any) -> Any:
     """Two Chebyshev steps; r is left one step behind x, by A times the result."""
     from xcrack.linalg.kernels.cycle import first_step, next_step
 
-    high, low = level.spectrum_bound, _SHARE * level.spectrum_bound
-    middle, half = (high + low) / 2, (high - low) / 2
+    lambda_max, lambda_min = level.spectrum_bound, _SHARE * level.spectrum_bound
+    middle, half = (lambda_max + lambda_min) / 2, (lambda_max - lambda_min) / 2
     sigma = middle / half
     rho = 1 / (2 * sigma - 1 / sigma)
     dtype = np.float32
@@ -400,15 +400,15 @@ def _aggregation_levels(
     while A.shape[0] > _COARSEST or not levels:
         blocks = store_blocks(A) if levels else finest_blocks.in_single_precision()
         diagonal = _diagonal(A)
-        largest = largest_eigenvalue(blocks, diagonal)
+        lambda_max = largest_eigenvalue(blocks, diagonal)
         P, candidates = _prolongator(
-            A, diagonal, largest, candidates, is_fixed_node, blocks.idle_rows
+            A, diagonal, lambda_max, candidates, is_fixed_node, blocks.idle_rows
         )
         scale = float(diagonal.max())
         A, prolongation = _coarse_matrix(A, P), sp.bsr_matrix(P, dtype=np.float32)
         is_fixed_node = np.zeros(len(A.indptr) - 1, dtype=bool)
         del P
-        levels.append(_level(blocks, diagonal, largest, prolongation))
+        levels.append(_level(blocks, diagonal, lambda_max, prolongation))
         if A.shape[0] > 0.7 * prolongation.shape[0]:
             break
     return tuple(levels), _pseudo_inverse(A.toarray(), scale)
@@ -474,12 +474,12 @@ def extended_cycle(
     )
     if patches is None:
         inverse = reciprocal(diagonal).astype(np.float32)
-        largest = largest_eigenvalue(single_factor, diagonal)
+        bound = largest_eigenvalue(single_factor, diagonal)
     else:
         inverse = np.ones(len(diagonal), np.float32)
-        largest = largest_eigenvalue(single_factor, diagonal, patches.times)
+        bound = largest_eigenvalue(single_factor, diagonal, patches.times)
     top = GridLevel(
-        single_factor, lock(inverse), largest, finest_level.prolong, finest_level.restrict, patches
+        single_factor, lock(inverse), bound, finest_level.prolong, finest_level.restrict, patches
     )
     return VCycle((top, *levels.levels[1:]), levels.coarse_inverse)
 
@@ -493,16 +493,16 @@ def _diagonal(A: sp.bsr_matrix) -> Floats:
     return result.ravel()
 
 
-def _level(blocks: RowBlocks, diagonal: Floats, largest: float, P: sp.bsr_matrix) -> GridLevel:
+def _level(blocks: RowBlocks, diagonal: Floats, lambda_max: float, P: sp.bsr_matrix) -> GridLevel:
     R = sp.bsr_matrix(P.T, blocksize=P.blocksize[::-1])
     inverse = lock(reciprocal(diagonal).astype(np.float32))
-    return GridLevel(blocks, inverse, largest, store_blocks(P), store_blocks(R))
+    return GridLevel(blocks, inverse, lambda_max, store_blocks(P), store_blocks(R))
 
 
 def _prolongator(
     A: sp.bsr_matrix,
     diagonal: Floats,
-    largest: float,
+    lambda_max: float,
     candidates: Floats,
     is_fixed_node: Bools,
     idle_rows: Ints | None,
@@ -523,7 +523,7 @@ def _prolongator(
     count = np.zeros(n, dtype=np.int64)
     count[nodes] = np.diff(sp.bsr_matrix(T).indptr)
     T = sp.bsr_matrix((T.data, T.indices, offsets(count)), shape=(len(diagonal), T.shape[1]))
-    factor = _OMEGA * SAFETY / largest * reciprocal(diagonal)
+    factor = _OMEGA * SAFETY / lambda_max * reciprocal(diagonal)
     if idle_rows is not None:
         factor[idle_rows] = 0.0
     damped_factor = factor.reshape(n, -1)

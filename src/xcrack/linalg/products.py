@@ -47,8 +47,8 @@ def product(A: sp.csr_matrix, B: sp.csr_matrix) -> sp.csr_matrix:
     count = min(number_of_threads(), A.nnz // _LEAST_ENTRIES)
     if count < 2:
         return sp.csr_matrix(A @ B)
-    inner = np.searchsorted(A.indptr, np.linspace(0, A.nnz, count + 1)[1:-1])
-    ends = [0, *inner.tolist(), A.shape[0]]
+    cut_rows = np.searchsorted(A.indptr, np.linspace(0, A.nnz, count + 1)[1:-1])
+    ends = [0, *cut_rows.tolist(), A.shape[0]]
 
     def rows(span: tuple[int, int]) -> sp.csr_matrix:
         indptr = A.indptr[span[0] : span[1] + 1]
@@ -148,7 +148,7 @@ class RowBlocks:
         else:
 
             def multiply_rows(stretch: slice) -> None:
-                multiply(*(each[stretch] for each in blocks), *factors, y, number, y)
+                multiply(*(array[stretch] for array in blocks), *factors, y, number, y)
 
             map_tasks(multiply_rows, self._stretches(count))
         if idle_values is not None:
@@ -241,13 +241,13 @@ def store_blocks(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
         order = np.lexsort((indices, row))
         blocks, indices = blocks[order], indices[order]
     chunks = rows // _TOGETHER
-    every = np.empty((len(indices), columns), np.uint32)
+    entry_columns = np.empty((len(indices), columns), np.uint32)
     is_shared = chunks == 1 and blocks.dtype == dtype and blocks.flags.c_contiguous
     values = blocks.ravel() if is_shared else np.empty(blocks.size, dtype)
 
     def store(span: tuple[int, int]) -> None:
         part, row_of_part = slice(*span), row[slice(*span)]
-        every[part] = indices[part, None] * np.int64(columns) + np.arange(columns)
+        entry_columns[part] = indices[part, None] * np.int64(columns) + np.arange(columns)
         if is_shared:
             return
         if chunks == 1:
@@ -265,7 +265,7 @@ def store_blocks(A: sp.bsr_matrix, dtype: Any = np.float32) -> RowBlocks:
     first = np.arange(0, A.shape[0] + 1, rows, dtype=np.uint32)
     start = (A.indptr * np.int64(columns)).astype(np.uint32)
     offset = (A.indptr * np.int64(rows * columns)).astype(np.uint32)
-    return RowBlocks(A.shape, *map(lock, (first, start, offset, every.ravel(), values)))
+    return RowBlocks(A.shape, *map(lock, (first, start, offset, entry_columns.ravel(), values)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,11 +69,11 @@ class Operator:
 
     def answers(self, ask: Request, vectors: Sequence[Floats]) -> list[Floats]:
         """What is asked for of several vectors."""
-        one, all_times = self.times, self.times_all
+        times_one, all_times = self.times, self.times_all
         if ask is Request.CYCLE:
-            one, all_times = self.cycle, self.cycle_all
+            times_one, all_times = self.cycle, self.cycle_all
         if len(vectors) == 1 or all_times is None:
-            return [one(v) for v in vectors]
+            return [times_one(v) for v in vectors]
         return all_times(vectors)
 
 
@@ -163,7 +163,7 @@ class _Plane:
     scaled_rows: sp.csr_matrix
     solve: Apply
 
-    def nearest(self, y: Floats) -> Floats:
+    def projection(self, y: Floats) -> Floats:
         return y - self.scaled_rows @ self.solve(self.rows @ y + self.offset)
 
     def project(self, z: Floats) -> Floats:
@@ -209,7 +209,7 @@ class _Descent:
 
     def __init__(self, K: Operator, b: Floats, plane: _Plane | None, y: Floats) -> None:
         self.K, self.b, self.plane = K, b, plane
-        self.y = y.copy() if plane is None else plane.nearest(y)
+        self.y = y.copy() if plane is None else plane.projection(y)
         self.row_forces = np.zeros(0 if plane is None else len(plane.scale))
         self.p: Floats | None = None
         self.rz, self.norm = 1.0, np.inf
@@ -449,7 +449,7 @@ class _Loop:
         plane = self._plane_of(self.is_movable)
         if size > 0 or plane is None:
             return size
-        return _norm((yield Request.TIMES, plane.nearest(np.zeros(len(self.b)))))
+        return _norm((yield Request.TIMES, plane.projection(np.zeros(len(self.b)))))
 
     def _result(self, y: Floats, pressure: Floats, gap: Floats, is_active: Bools) -> ProjectedState:
         length = np.abs(gap / self.measure).max(initial=0.0)

@@ -72,10 +72,10 @@ def free_motion(
     is_standard = np.ones(space.n_nodes, dtype=bool)
     is_standard[space.cell_nodes[space.enriched_cells]] = False
     is_standard[space.mesh.n_points :] = False
-    every = np.zeros(space.n_nodes, dtype=bool)
-    every[: space.mesh.n_points] = True
-    for chosen in (is_standard, every):
-        candidates = (np.nonzero(chosen)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
+    is_point = np.zeros(space.n_nodes, dtype=bool)
+    is_point[: space.mesh.n_points] = True
+    for mask in (is_standard, is_point):
+        candidates = (np.nonzero(mask)[0][:, None] * space.dim + np.arange(space.dim)).ravel()
         candidates = candidates[~is_fixed[candidates]]
         if len(candidates) < free_motions.shape[1]:
             continue
@@ -101,7 +101,7 @@ def balanced_loads(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Flo
     n = space.n_nodes * d
     resultants = motion.modes.T @ f
     # Of unit translations and of rotations with a lever of the body's size.
-    largest = 0.0
+    largest_share = 0.0
     for k, residual in enumerate(resultants.T / motion.size):
         total = _total_force(space, f[:, k])
         if total == 0:
@@ -116,8 +116,8 @@ def balanced_loads(space: FunctionSpace, motion: Motion, f: Floats) -> tuple[Flo
                 f"{np.round(resultant[d:], 6).tolist()}): add a support such as fix(set, axis), "
                 "or loads that balance."
             )
-        largest = max(largest, share)
-    return f - motion.modes @ resultants, largest
+        largest_share = max(largest_share, share)
+    return f - motion.modes @ resultants, largest_share
 
 
 def _total_force(space: FunctionSpace, f: Floats) -> float:
@@ -129,8 +129,8 @@ def _total_force(space: FunctionSpace, f: Floats) -> float:
         total += float(size[number[number >= 0]].sum())
     for tip in space.tips:
         first = tip.point_to_function[tip.point_to_function >= 0]
-        each = (first[:, None] + np.arange(tip.functions)).ravel()
-        total += float(size[each].sum()) / np.sqrt(tip.radius)
+        functions = (first[:, None] + np.arange(tip.functions)).ravel()
+        total += float(size[functions].sum()) / np.sqrt(tip.radius)
     return total
 
 
@@ -164,9 +164,9 @@ def pieces(space: FunctionSpace) -> tuple[Ints, int, Floats]:
     mesh, parts = space.mesh, n_parts(space)
     subs = sub_cells(space, np.arange(len(mesh.cells)))
     of_sub = parts * subs.cell + part_numbers(space, subs.cell, subs.side)
-    one, other = _neighbours(space)
+    part, neighbour = _neighbours(space)
     n = parts * len(mesh.cells)
-    graph = sp.csr_matrix((np.ones(len(one)), (one, other)), shape=(n, n))
+    graph = sp.csr_matrix((np.ones(len(part)), (part, neighbour)), shape=(n, n))
     label = connected_components(graph, directed=False)[1]
     names, number = np.unique(label[of_sub], return_inverse=True)
     piece = np.zeros(n, dtype=np.int64)
@@ -183,9 +183,9 @@ def pieces(space: FunctionSpace) -> tuple[Ints, int, Floats]:
 def _neighbours(space: FunctionSpace) -> tuple[Ints, Ints]:
     """Parts of cells that share a part of a facet on which no crack lies, by their numbers."""
     mesh = space.mesh
-    inner = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
-    parts = space.geometry.split_facets(space, mesh.facets[inner])
-    facet = inner[parts.number]
+    inner_facets = np.nonzero(mesh.facet_to_cell[:, 1] >= 0)[0]
+    parts = space.geometry.split_facets(space, mesh.facets[inner_facets])
+    facet = inner_facets[parts.number]
     is_apart = np.zeros(len(facet), dtype=bool)
     for c, cut in enumerate(space.cuts):
         has_two_cells = cut.lip_cell[:, 0] != cut.lip_cell[:, 1]

@@ -42,13 +42,13 @@ def pattern_sizes(indptr, indices, first, n_columns):  # type: ignore[no-untyped
 
 
 @kernel
-def _sort(values, first, last):  # type: ignore[no-untyped-def]
+def _sort(values, first, end):  # type: ignore[no-untyped-def]
     """Sort a stretch (Shell); numba's own sort takes longer to compile than the rest."""
     gap = 1
-    while 3 * gap + 1 < last - first:
+    while 3 * gap + 1 < end - first:
         gap = 3 * gap + 1
     while gap > 0:
-        for place in range(first + gap, last):
+        for place in range(first + gap, end):
             value = values[place]
             at = place
             while at >= first + gap and values[at - gap] > value:
@@ -120,11 +120,11 @@ def product(first, start, offset, columns, values, x, y, scale, out):  # type: i
     """
     zero = scale - scale
     for g in range(len(first) - 1):
-        low, high = start[g], start[g + 1]
+        begin, stop = start[g], start[g + 1]
         row, end, p = first[g], first[g + 1], offset[g]
         while row + _TWO < end:
             a, b, c = zero, zero, zero
-            for k in range(low, high):
+            for k in range(begin, stop):
                 xk = x[columns[k]]
                 a += values[p] * xk
                 b += values[p + _ONE] * xk
@@ -136,7 +136,7 @@ def product(first, start, offset, columns, values, x, y, scale, out):  # type: i
             row += _THREE
         while row < end:
             a = zero
-            for k in range(low, high):
+            for k in range(begin, stop):
                 a += values[p] * x[columns[k]]
                 p += _ONE
             out[row] = y[row] + scale * a
@@ -160,15 +160,15 @@ def product_of_four(first, start, offset, columns, values, x, y, scale, out):  #
         May be y.
     """
     for g in range(len(first) - 1):
-        low, high = np.int64(start[g]), np.int64(start[g + 1])
+        begin, stop = np.int64(start[g]), np.int64(start[g + 1])
         row, end, place = np.int64(first[g]), np.int64(first[g + 1]), np.int64(offset[g])
         while row + 2 < end:
-            three_rows(columns, values, x, y, scale, out, low, high, place, row)
-            place += 3 * (high - low)
+            three_rows(columns, values, x, y, scale, out, begin, stop, place, row)
+            place += 3 * (stop - begin)
             row += 3
         while row < end:
-            one_row(columns, values, x, y, scale, out, low, high, place, row)
-            place += high - low
+            one_row(columns, values, x, y, scale, out, begin, stop, place, row)
+            place += stop - begin
             row += 1
 
 

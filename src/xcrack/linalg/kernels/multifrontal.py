@@ -131,7 +131,7 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R
     lower_letter, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
     transpose, right_side = lower_letter + 2, lower_letter + 3
-    one, minus_one = factors.ctypes.data, factors.ctypes.data + 8
+    plus_one, minus_one = factors.ctypes.data, factors.ctypes.data + 8
     rows, pivots, rest, info = (
         size.ctypes.data,
         size.ctypes.data + 4,
@@ -141,12 +141,12 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
     for t in range(low_part, high_part):
         if not chosen_parts[t]:
             continue
-        low = first[t]
-        k, b = first[t + 1] - low, begin[t + 1] - begin[t]
+        first_pivot = first[t]
+        k, b = first[t + 1] - first_pivot, begin[t + 1] - begin[t]
         m = k + b
         L = numba.carray(doubles_at(panel[t]), (k * m,))
         for j in range(k):
-            for e in range(start[low + j], start[low + j + 1]):
+            for e in range(start[first_pivot + j], start[first_pivot + j + 1]):
                 L[j * m + row[e]] = value[e]
         for j in range(b):
             square_column = numba.carray(
@@ -177,7 +177,7 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
                     no_transpose,
                     rest,
                     pivots,
-                    one,
+                    plus_one,
                     panel[t],
                     rows,
                     panel_below,
@@ -198,7 +198,7 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
                 minus_one,
                 panel_below,
                 rows,
-                one,
+                plus_one,
                 square[t],
                 rest,
             )
@@ -221,19 +221,19 @@ def copy_stretches(source, target, count):  # type: ignore[no-untyped-def]
     """Copy stretches of numbers from address to address."""
     for t in range(len(count)):
         if count[t] > 0:
-            one = numba.carray(doubles_at(source[t]), (count[t],))
-            other = numba.carray(doubles_at(target[t]), (count[t],))
+            source_values = numba.carray(doubles_at(source[t]), (count[t],))
+            target_values = numba.carray(doubles_at(target[t]), (count[t],))
             for i in range(count[t]):
-                other[i] = one[i]
+                target_values[i] = source_values[i]
 
 
 @kernel
 def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward):  # type: ignore[no-untyped-def]
     """Solve for one right-hand side `(n,)`, in place; see `substitute`."""
-    parts, largest = len(first) - 1, 1
+    parts, largest_boundary = len(first) - 1, 1
     for t in range(parts):
-        largest = max(largest, begin[t + 1] - begin[t])
-    B = np.empty(largest)
+        largest_boundary = max(largest_boundary, begin[t + 1] - begin[t])
+    B = np.empty(largest_boundary)
     size, factors, letter = np.empty(4, np.int32), np.empty(3), np.empty(3, np.uint8)
     size[3] = 1
     factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
@@ -243,7 +243,7 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
         letter.ctypes.data + 1,
         letter.ctypes.data + 2,
     )
-    one, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
+    unit, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
     pivots, rows, rest, step = (
         size.ctypes.data,
         size.ctypes.data + 4,
@@ -252,21 +252,21 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
     )
     x0, b0 = x.ctypes.data, B.ctypes.data
     for t in range(parts if is_forward else 0):
-        low, q = first[t], begin[t]
-        k, b = first[t + 1] - low, begin[t + 1] - q
+        row, q = first[t], begin[t]
+        k, b = first[t + 1] - row, begin[t + 1] - q
         if k == 0:
             continue
         size[0], size[1], size[2] = k, k + b, b
-        dtrsv(lower_letter, no_transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
+        dtrsv(lower_letter, no_transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * row, step)
         if b > 0:
             dgemv(
                 no_transpose,
                 rest,
                 pivots,
-                one,
+                unit,
                 panel[t] + np.uint64(8 * k),
                 rows,
-                x0 + 8 * low,
+                x0 + 8 * row,
                 step,
                 zero,
                 b0,
@@ -275,8 +275,8 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
             for i in range(b):
                 x[boundary[q + i]] -= B[i]
     for t in range(parts - 1 if is_backward else -1, -1, -1):
-        low, q = first[t], begin[t]
-        k, b = first[t + 1] - low, begin[t + 1] - q
+        row, q = first[t], begin[t]
+        k, b = first[t + 1] - row, begin[t + 1] - q
         if k == 0:
             continue
         size[0], size[1], size[2] = k, k + b, b
@@ -292,11 +292,11 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
                 rows,
                 b0,
                 step,
-                one,
-                x0 + 8 * low,
+                unit,
+                x0 + 8 * row,
                 step,
             )
-        dtrsv(lower_letter, transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * low, step)
+        dtrsv(lower_letter, transpose, no_transpose, pivots, panel[t], rows, x0 + 8 * row, step)
     return letter[0] == 76 and factors[0] == 1.0  # which keeps both alive until here
 
 
@@ -322,17 +322,17 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82
     lower_letter, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
     transpose, right_side = lower_letter + 2, lower_letter + 3
-    one, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
+    unit, minus_one, zero = factors.ctypes.data, factors.ctypes.data + 8, factors.ctypes.data + 16
     columns, pivots, rows, rest = (
         size.ctypes.data,
         size.ctypes.data + 4,
         size.ctypes.data + 8,
         size.ctypes.data + 12,
     )
-    largest = 1
+    largest_boundary = 1
     for t in range(parts):
-        largest = max(largest, begin[t + 1] - begin[t])
-    B = np.empty((largest, r))
+        largest_boundary = max(largest_boundary, begin[t + 1] - begin[t])
+    B = np.empty((largest_boundary, r))
     size[0] = r
     x0, b0 = X.ctypes.data, B.ctypes.data
     if is_forward:
@@ -342,8 +342,8 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
             p = order[t]
             if p > 1:
                 is_touched[rank[p >> 1]] = True
-            low, at, q = first[t], panel[t], begin[t]
-            k, b = first[t + 1] - low, begin[t + 1] - q
+            row, at, q = first[t], panel[t], begin[t]
+            k, b = first[t + 1] - row, begin[t + 1] - q
             m = k + b
             if k == 0:
                 continue
@@ -356,10 +356,10 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
                 no_transpose,
                 columns,
                 pivots,
-                one,
+                unit,
                 at,
                 rows,
-                x0 + 8 * low * r,
+                x0 + 8 * row * r,
                 columns,
             )
             if b > 0:
@@ -369,8 +369,8 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
                     columns,
                     rest,
                     pivots,
-                    one,
-                    x0 + 8 * low * r,
+                    unit,
+                    x0 + 8 * row * r,
                     columns,
                     at + np.uint64(8 * k),
                     rows,
@@ -384,8 +384,8 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
                         X[g, c] -= B[i, c]
     if is_backward:
         for t in range(parts - 1, -1, -1):
-            low, at, q = first[t], panel[t], begin[t]
-            k, b = first[t + 1] - low, begin[t + 1] - q
+            row, at, q = first[t], panel[t], begin[t]
+            k, b = first[t + 1] - row, begin[t + 1] - q
             m = k + b
             if k == 0:
                 continue
@@ -406,8 +406,8 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
                     columns,
                     at + np.uint64(8 * k),
                     rows,
-                    one,
-                    x0 + 8 * low * r,
+                    unit,
+                    x0 + 8 * row * r,
                     columns,
                 )
             dtrsm(
@@ -417,47 +417,47 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
                 no_transpose,
                 columns,
                 pivots,
-                one,
+                unit,
                 at,
                 rows,
-                x0 + 8 * low * r,
+                x0 + 8 * row * r,
                 columns,
             )
     return letter[0] == 76 and factors[0] == 1.0  # which keeps both alive until here
 
 
 @kernel
-def _cut(ranking, centre, cells, low, high, last, visit, begin_of_point):  # type: ignore[no-untyped-def]
+def _cut(ranking, centre, cells, begin, end, last_cell, visit, begin_of_point):  # type: ignore[no-untyped-def]
     """Axis and place of a cut near the middle of some cells, with the fewest points on it.
 
-    `last` is the last cell of each point, `visit` the latest look at it and, at its end, how many
+    `last_cell` is that of each point, `visit` the latest look at it and, at its end, how many
     looks there were, `begin_of_point` the number of points that come with each cell.
     """
-    half, width = low + (high - low) // 2, 0.0
+    half, width = begin + (end - begin) // 2, 0.0
     axis, place, lowest_price = 0, half, np.inf
     for i in range(len(ranking)):
-        width = max(width, centre[ranking[i, high - 1], i] - centre[ranking[i, low], i])
-    slack = int(_SLACK * (high - low))
+        width = max(width, centre[ranking[i, end - 1], i] - centre[ranking[i, begin], i])
+    slack = int(_SLACK * (end - begin))
     for i in range(len(ranking)):
-        if centre[ranking[i, high - 1], i] - centre[ranking[i, low], i] < 0.5 * width:
+        if centre[ranking[i, end - 1], i] - centre[ranking[i, begin], i] < 0.5 * width:
             continue
         visit[-1] += 1
-        for k in range(low, high):
+        for k in range(begin, end):
             begin_of_point[k] = 0
             for j in range(cells.shape[1]):
                 point = cells[ranking[i, k], j]
-                last[point] = k
+                last_cell[point] = k
                 if visit[point] != visit[-1]:
                     visit[point] = visit[-1]
                     begin_of_point[k] += 1
         points = 0  # that have cells on both sides of the cut behind cell k
-        for k in range(low, half + slack):
+        for k in range(begin, half + slack):
             points += begin_of_point[k]
             for j in range(cells.shape[1]):
-                points -= last[cells[ranking[i, k], j]] == k
+                points -= last_cell[cells[ranking[i, k], j]] == k
             distance = abs(k + 1 - half)
             if distance <= slack:
-                price = points * (1.0 + 4.0 * (distance / (high - low)) ** 2)
+                price = points * (1.0 + 4.0 * (distance / (end - begin)) ** 2)
                 if price < lowest_price or (price == lowest_price and distance < abs(place - half)):
                     axis, place, lowest_price = i, k + 1, price
     return axis, place
@@ -483,23 +483,23 @@ def bisect_cells(ranking, centre, cells, n_points, depth):  # type: ignore[no-un
         Number 0 to 2^depth - 1.
     """
     d, n = ranking.shape
-    last, visit = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
+    last_cell, visit = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
     begin_of_point = np.empty(n, dtype=np.int64)
     leaf = np.empty(n, dtype=np.int64)
-    low, high = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-    high[0] = n
+    begin, end = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    end[0] = n
     is_lower = np.empty(n, dtype=np.bool_)
     buffer = np.empty(n, dtype=np.int64)
     for _ in range(depth):
-        m = len(low)
-        new_low, new_high = np.empty(2 * m, dtype=np.int64), np.empty(2 * m, dtype=np.int64)
+        m = len(begin)
+        new_begin, new_end = np.empty(2 * m, dtype=np.int64), np.empty(2 * m, dtype=np.int64)
         for g in range(m):
-            a, b = low[g], high[g]
+            a, b = begin[g], end[g]
             half, axis = a + (b - a) // 2, 0
             if b - a > 1:
-                axis, half = _cut(ranking, centre, cells, a, b, last, visit, begin_of_point)
-            new_low[2 * g], new_high[2 * g] = a, half
-            new_low[2 * g + 1], new_high[2 * g + 1] = half, b
+                axis, half = _cut(ranking, centre, cells, a, b, last_cell, visit, begin_of_point)
+            new_begin[2 * g], new_end[2 * g] = a, half
+            new_begin[2 * g + 1], new_end[2 * g + 1] = half, b
             if b - a < 2:
                 continue
             for k in range(a, b):
@@ -507,20 +507,20 @@ def bisect_cells(ranking, centre, cells, n_points, depth):  # type: ignore[no-un
             for i in range(d):
                 if i == axis:
                     continue
-                one, other = a, 0
+                lower_end, n_upper = a, 0
                 for k in range(a, b):
                     c = ranking[i, k]
                     if is_lower[c]:
-                        ranking[i, one] = c
-                        one += 1
+                        ranking[i, lower_end] = c
+                        lower_end += 1
                     else:
-                        buffer[other] = c
-                        other += 1
-                for k in range(other):
-                    ranking[i, one + k] = buffer[k]
-        low, high = new_low, new_high
-    for g in range(len(low)):
-        for k in range(low[g], high[g]):
+                        buffer[n_upper] = c
+                        n_upper += 1
+                for k in range(n_upper):
+                    ranking[i, lower_end + k] = buffer[k]
+        begin, end = new_begin, new_end
+    for g in range(len(begin)):
+        for k in range(begin[g], end[g]):
             leaf[ranking[0, k]] = g
     return leaf
 
@@ -599,15 +599,15 @@ def postorder(depth):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sort(values, low, high):  # type: ignore[no-untyped-def]
+def _sort(values, begin, end):  # type: ignore[no-untyped-def]
     """Sort a stretch (Shell); numba's own sort takes longer to compile than the rest."""
     gap = 1
-    while 3 * gap + 1 < high - low:
+    while 3 * gap + 1 < end - begin:
         gap = 3 * gap + 1
     while gap > 0:
-        for i in range(low + gap, high):
+        for i in range(begin + gap, end):
             value, j = values[i], i
-            while j >= low + gap and values[j - gap] > value:
+            while j >= begin + gap and values[j - gap] > value:
                 values[j] = values[j - gap]
                 j -= gap
             values[j] = value
@@ -651,25 +651,25 @@ def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # ty
     capacity = 8 * n + 1000
     boundary = np.empty(capacity, dtype=np.int32)
     in_parent = np.empty(capacity, dtype=np.int32)
-    mark, local = np.zeros(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+    mark, row_in_front = np.zeros(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     to = 0
     for t in range(parts):
-        low, high, top = first[t], first[t + 1], begin[t]
+        first_pivot, end_pivot, top = first[t], first[t + 1], begin[t]
         if top + n > capacity:
             capacity = 2 * capacity + n
             longer_boundary, wider_map = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
             for k in range(top):
                 longer_boundary[k], wider_map[k] = boundary[k], in_parent[k]
             boundary, in_parent = longer_boundary, wider_map
-        for c in range(low, high):
+        for c in range(first_pivot, end_pivot):
             for k in range(indptr[perm[c]], indptr[perm[c] + 1]):
                 i = place[indices[k]]
                 row[to], value[to] = i, data[k]
                 to += i >= c  # without a branch, which no processor foresees
             start[c + 1] = to
-        for k in range(start[low], to):
+        for k in range(start[first_pivot], to):
             i = row[k]
-            if i >= high and mark[i] != t + 1:
+            if i >= end_pivot and mark[i] != t + 1:
                 mark[i] = t + 1
                 boundary[top] = i
                 top += 1
@@ -678,22 +678,22 @@ def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # ty
             for child in (rank[2 * p], rank[2 * p + 1]):
                 for k in range(begin[child], begin[child + 1]):
                     i = boundary[k]
-                    if i >= high and mark[i] != t + 1:
+                    if i >= end_pivot and mark[i] != t + 1:
                         mark[i] = t + 1
                         boundary[top] = i
                         top += 1
         _sort(boundary, begin[t], top)
         begin[t + 1] = top
-        for j in range(high - low):
-            local[low + j] = j
+        for j in range(end_pivot - first_pivot):
+            row_in_front[first_pivot + j] = j
         for k in range(begin[t], top):
-            local[boundary[k]] = high - low + k - begin[t]
+            row_in_front[boundary[k]] = end_pivot - first_pivot + k - begin[t]
         if 2 * p <= parts:
             for child in (rank[2 * p], rank[2 * p + 1]):
                 for k in range(begin[child], begin[child + 1]):
-                    in_parent[k] = local[boundary[k]]
-        for k in range(start[low], to):
-            row[k] = local[row[k]]
+                    in_parent[k] = row_in_front[boundary[k]]
+        for k in range(start[first_pivot], to):
+            row[k] = row_in_front[row[k]]
     end = begin[parts]
     return begin, boundary[:end].copy(), in_parent[:end].copy(), start, row[:to], value[:to]
 
@@ -772,9 +772,9 @@ def unchanged_parts(fronts, previous_factor):  # type: ignore[no-untyped-def]
         k, b = first[t + 1] - first[t], begin[t + 1] - begin[t]
         if k != first0[t + 1] - first0[t] or b != begin0[t + 1] - begin0[t]:
             continue
-        low, low0 = start[first[t]], start0[first0[t]]
-        count = start[first[t + 1]] - low
-        is_same = count == start0[first0[t + 1]] - low0
+        e, e0 = start[first[t]], start0[first0[t]]
+        count = start[first[t + 1]] - e
+        is_same = count == start0[first0[t + 1]] - e0
         if is_same:
             for j in range(k):
                 c, c0 = first[t] + j, first0[t] + j
@@ -783,7 +783,7 @@ def unchanged_parts(fronts, previous_factor):  # type: ignore[no-untyped-def]
                     break
         if is_same:
             for i in range(count):
-                if row[low + i] != row0[low0 + i] or value[low + i] != value0[low0 + i]:
+                if row[e + i] != row0[e0 + i] or value[e + i] != value0[e0 + i]:
                     is_same = False
                     break
         p = order[t]

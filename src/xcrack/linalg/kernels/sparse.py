@@ -23,12 +23,12 @@ def times(indptr, indices, data, x):  # type: ignore[no-untyped-def]
     result = np.empty((len(indptr) - 1, columns))
     for i in range(len(result)):
         for first in range(0, columns, 2):  # two at once, which stay in registers
-            second = min(first + 1, columns - 1)
-            total, other = 0.0, 0.0
+            next_column = min(first + 1, columns - 1)
+            total, next_total = 0.0, 0.0
             for k in range(indptr[i], indptr[i + 1]):
                 total += data[k] * x[indices[k], first]
-                other += data[k] * x[indices[k], second]
-            result[i, first], result[i, second] = total, other
+                next_total += data[k] * x[indices[k], next_column]
+            result[i, first], result[i, next_column] = total, next_total
     return result
 
 
@@ -57,25 +57,25 @@ def times_transposed(indptr, indices, data, n_columns, x):  # type: ignore[no-un
 @kernel
 def residual(indptr, indices, data, x, b):  # type: ignore[no-untyped-def]
     """Largest norm of b - A x over that of b, of all columns `(n, k)`."""
-    largest, columns = 0.0, x.shape[1]
+    largest_share, columns = 0.0, x.shape[1]
     for first in range(0, columns, 2):  # two at once: reading A is what takes the time
-        second = min(first + 1, columns - 1)
+        next_column = min(first + 1, columns - 1)
         largest_residual, size, other_rest, other_size = 0.0, 0.0, 0.0, 0.0
         for i in range(len(indptr) - 1):
-            total, other = 0.0, 0.0
+            total, next_total = 0.0, 0.0
             for k in range(indptr[i], indptr[i + 1]):
                 total += data[k] * x[indices[k], first]
-                other += data[k] * x[indices[k], second]
+                next_total += data[k] * x[indices[k], next_column]
             largest_residual += (b[i, first] - total) ** 2
             size += b[i, first] ** 2
-            other_rest += (b[i, second] - other) ** 2
-            other_size += b[i, second] ** 2
+            other_rest += (b[i, next_column] - next_total) ** 2
+            other_size += b[i, next_column] ** 2
         for r, n in ((largest_residual, size), (other_rest, other_size)):
             share = np.sqrt(r / n) if n > 0 else np.sqrt(r)
             if np.isnan(share):
                 return share
-            largest = max(largest, share)
-    return largest
+            largest_share = max(largest_share, share)
+    return largest_share
 
 
 @kernel
@@ -210,17 +210,17 @@ def dense_blocks(indptr, indices, data, members, offsets):  # type: ignore[no-un
     place = np.full(len(indptr) - 1, -1, np.int64)
     start = 0
     for b in range(n_blocks):
-        first, last = offsets[b], offsets[b + 1]
-        size = last - first
-        for k in range(first, last):
+        first, end = offsets[b], offsets[b + 1]
+        size = end - first
+        for k in range(first, end):
             place[members[k]] = k - first
-        for k in range(first, last):
+        for k in range(first, end):
             row = members[k]
             for j in range(indptr[row], indptr[row + 1]):
                 column = place[indices[j]]
                 if column >= 0:
                     result[start + (k - first) * size + column] += data[j]
-        for k in range(first, last):
+        for k in range(first, end):
             place[members[k]] = -1
         start += size * size
     return result
@@ -271,8 +271,8 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
     start = np.zeros(n + 1, np.int32)
     begin, has_failed = 0, False
     for b in range(blocks):
-        first, last = offsets[b], offsets[b + 1]
-        size, s = last - first, n_standard[b]
+        first, end = offsets[b], offsets[b + 1]
+        size, s = end - first, n_standard[b]
         e = size - s
         if e == 0:
             continue
