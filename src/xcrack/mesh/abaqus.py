@@ -204,9 +204,9 @@ class AbaqusModel:
         result = []
         for face in np.unique(faces):
             for group, rows in self.rows_of(elements[faces == face]):
-                local = _FACES.get(base_kind(group.kind) or "", ())
-                if self.is_body(group) and face < len(local):
-                    corners = local[face]
+                face_corners = _FACES.get(base_kind(group.kind) or "", ())
+                if self.is_body(group) and face < len(face_corners):
+                    corners = face_corners[face]
                     result.append((_FACE_KIND[len(corners)], group.nodes[rows][:, corners]))
         return result
 
@@ -215,10 +215,10 @@ class AbaqusModel:
         edges: dict[int, tuple[int, int]] = {}
         for group in self.body_groups:
             shape = SHAPES[base_kind(group.kind) or ""]
-            local = shape.edges
-            middles = group.nodes[:, shape.corners : shape.corners + len(local)]
+            edge_ends = shape.edges
+            middles = group.nodes[:, shape.corners : shape.corners + len(edge_ends)]
             for k in range(middles.shape[1]):
-                i, j = local[k]
+                i, j = edge_ends[k]
                 edges.update(
                     zip(middles[:, k].tolist(), group.nodes[:, (i, j)].tolist(), strict=True)
                 )
@@ -239,34 +239,32 @@ class AbaqusModel:
             if base_kind(g.kind) or not has_body
         ]
         set_entries: list[tuple[str, str, Ints]] = list(sets)
-        for key, one in self.element_sets.items():
-            name = self.shown_name(key, one)
+        for key, s in self.element_sets.items():
+            name = self.shown_name(key, s)
             set_entries += [
                 (group.kind, name, group.nodes[rows])
-                for group, rows in self.rows_of(one.members)
+                for group, rows in self.rows_of(s.members)
                 if base_kind(group.kind)
             ]
-        for key, one in self.surfaces.items():
-            name = self.shown_name(key, one)
-            faces = np.zeros(0, np.int64) if one.faces is None else one.faces
-            set_entries += [(kind, name, rows) for kind, rows in self.facets_of(one.members, faces)]
-        point_sets = [
-            (self.shown_name(key, one), one.members) for key, one in self.node_sets.items()
-        ]
+        for key, s in self.surfaces.items():
+            name = self.shown_name(key, s)
+            faces = np.zeros(0, np.int64) if s.faces is None else s.faces
+            set_entries += [(kind, name, rows) for kind, rows in self.facets_of(s.members, faces)]
+        point_sets = [(self.shown_name(key, s), s.members) for key, s in self.node_sets.items()]
         point_sets += [
-            (self.shown_name(key, one), one.members)
-            for key, one in self.surfaces.items()
-            if one.faces is None
+            (self.shown_name(key, s), s.members)
+            for key, s in self.surfaces.items()
+            if s.faces is None
         ]
         return RawMesh(self.points, blocks, set_entries, point_sets)
 
-    def shown_name(self, key: tuple[str, str], one: NamedSet) -> str:
+    def shown_name(self, key: tuple[str, str], named_set: NamedSet) -> str:
         """Name of a set in the mesh: with its instance where there are several."""
         instance, name = key
-        every = (self.node_sets, self.element_sets, self.surfaces)
-        if instance and (len(self.instances) > 1 or any(("", name) in sets for sets in every)):
-            return f"{instance}.{one.name}"
-        return one.name
+        tables = (self.node_sets, self.element_sets, self.surfaces)
+        if instance and (len(self.instances) > 1 or any(("", name) in sets for sets in tables)):
+            return f"{instance}.{named_set.name}"
+        return named_set.name
 
     def mesh_uses(self) -> list[KeywordUse]:
         """What the mesh was made of, keyword by keyword."""
@@ -419,7 +417,7 @@ def _assemble_parts(
                 placed_titles.add(title)
                 begin, content = parts[title]
                 lines.append((DeckLine(begin, instance, None), None))
-                lines += [(DeckLine(inner, instance, None), placing) for inner in content]
+                lines += [(DeckLine(line, instance, None), placing) for line in content]
         elif name == "END INSTANCE":
             lines.append((DeckLine(keyword, "", None), None))
             instance = ""
@@ -435,7 +433,7 @@ def _assemble_parts(
         part_lines: list[tuple[DeckLine, Placing]] = []
         for begin, content in parts.values():
             title = begin.option("NAME") if len(parts) > 1 else ""
-            part_lines += [(DeckLine(inner, title, None), None) for inner in (begin, *content)]
+            part_lines += [(DeckLine(line, title, None), None) for line in (begin, *content)]
         titles = [begin.option("NAME") for begin, _ in parts.values()]
         return part_lines + lines, tuple(titles) if len(parts) > 1 else (), ()
     unused_places = tuple(parts[title][0].place for title in unplaced)
@@ -587,8 +585,8 @@ class _Builder:
         nodes = _SetTable("node", self.nodes, self.instances)
         for line, name, members in self._node_sets:
             if members is None and "ELSET" in line.keyword.options:
-                chosen = elements.members(line.keyword.options["ELSET"], line, None)
-                rows = [g.nodes[chosen[(chosen >= g.first) & (chosen < g.first + len(g.nodes))]
+                numbers = elements.members(line.keyword.options["ELSET"], line, None)
+                rows = [g.nodes[numbers[(numbers >= g.first) & (numbers < g.first + len(g.nodes))]
                                 - g.first].ravel() for g in groups]  # fmt: skip
                 members = np.unique(np.concatenate([np.zeros(0, np.int64), *rows])).tolist()
             nodes.add(line, name, members)
@@ -685,15 +683,15 @@ class _SetTable:
         keyword = line.keyword
         if len(entries) < 2:
             keyword.refuse("GENERATE needs a first and a last number, and a step if not 1.", number)
-        first, last, *rest = (
+        first, end, *rest = (
             keyword.whole_number(entry, number, "a number") for entry in entries[:3]
         )
         step = rest[0] if rest else 1
-        if not step or last - first > _MOST_MEMBERS * abs(step):
-            words = f"GENERATE from {first} to {last} makes too many members: give those there are."
+        if not step or end - first > _MOST_MEMBERS * abs(step):
+            words = f"GENERATE from {first} to {end} makes too many members: give those there are."
             keyword.refuse(words, number)
         scope = _instance_of(line, self.instances)
-        labels = range(first, last + 1, step)
+        labels = range(first, end + 1, step)
         rows = [self.numbers.get((scope, label), -1) for label in labels]
         return np.array([row for row in rows if row >= 0], dtype=np.int64)
 
@@ -744,16 +742,16 @@ def _members(
         entry = remainder
     if entry.isdigit():
         label = int(entry)
-        for one in dict.fromkeys((scope, *(instances if len(instances) == 1 else ()))):
-            if (one, label) in numbers:
-                return np.array([numbers[one, label]], dtype=np.int64)
-        where = f" in instance {scope}" if scope else ""
+        for owner in dict.fromkeys((scope, *(instances if len(instances) == 1 else ()))):
+            if (owner, label) in numbers:
+                return np.array([numbers[owner, label]], dtype=np.int64)
+        location = f" in instance {scope}" if scope else ""
         keyword.refuse(
-            f"the deck has no {what} {label}{where}: give the number of one that it has.", number
+            f"the deck has no {what} {label}{location}: give the number of one that it has.", number
         )
     named_set = _find(sets, entry, scope, instances)
     if named_set is None:
-        names = ", ".join(dict.fromkeys(one.name for one in sets.values()))
+        names = ", ".join(dict.fromkeys(entry_set.name for entry_set in sets.values()))
         keyword.refuse(
             f"the deck has no {what} set {value_text(entry)} before this line; it has "
             f"{names or 'none'}: give one of them.", number

@@ -219,9 +219,9 @@ class _Archive:
                 point_sets.append((name, np.array(node_rows, dtype=np.int64)))
                 continue
             for kind, rows_of_kind in arrays.items():
-                chosen = [place[m][1] for m in members if place.get(m, ("",))[0] == kind]
-                if chosen:
-                    sets.append((kind, name, rows_of_kind[chosen]))
+                element_rows = [place[m][1] for m in members if place.get(m, ("",))[0] == kind]
+                if element_rows:
+                    sets.append((kind, name, rows_of_kind[element_rows]))
         points = np.array(self.points, dtype=float).reshape(-1, 3)
         return RawMesh(points, list(arrays.items()), sets, point_sets)
 

@@ -46,12 +46,12 @@ def box(
     >>> box((0, 0), (2, 1), (4, 2))
     Mesh(15 points, 16 triangles, facet sets: left, right, bottom, top, boundary)
     """
-    low, high, count = np.asarray(lower), np.asarray(upper), np.asarray(n)
-    d = len(low)
+    x_min, x_max, count = np.asarray(lower), np.asarray(upper), np.asarray(n)
+    d = len(x_min)
     if d not in (2, 3):
-        raise MeshError(f"box: lower {low.tolist()} needs two or three coordinates.")
-    if len(high) != d or not (high > low).all():
-        raise MeshError(f"box: upper {high.tolist()} must exceed lower {low.tolist()}.")
+        raise MeshError(f"box: lower {x_min.tolist()} needs two or three coordinates.")
+    if len(x_max) != d or not (x_max > x_min).all():
+        raise MeshError(f"box: upper {x_max.tolist()} must exceed lower {x_min.tolist()}.")
     if count.shape not in ((), (d,)):
         raise MeshError(
             f"box: n has the shape {count.shape}: give a whole number, or one for each of the "
@@ -64,7 +64,7 @@ def box(
         raise MeshError(
             f"box: n = {count.tolist()} asks for more than {_MOST_CELLS:.0e} cells: take fewer."
         )
-    axes = [np.linspace(a, b, k + 1) for a, b, k in zip(low, high, count, strict=True)]
+    axes = [np.linspace(a, b, k + 1) for a, b, k in zip(x_min, x_max, count, strict=True)]
     index = np.indices(tuple(count + 1)).reshape(d, -1)
     points = np.stack([axis[i] for axis, i in zip(axes, index)], axis=1)
     stride = np.append(np.cumprod((count + 1)[:0:-1])[::-1], 1)

@@ -85,13 +85,13 @@ def checked_cells(points: Any, cells: Any) -> tuple[Floats, Ints]:
 
 
 def _oriented_cells(points: Floats, cells: Ints) -> Ints:
-    one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
+    start, end = np.array(list(combinations(range(cells.shape[1]), 2))).T
     volume, longest_edge = np.empty(len(cells)), np.empty(len(cells))
     for part in row_stretches(len(cells)):
         x = points[cells[part]]
         with np.errstate(all="ignore"):  # lengths whose products are too small for a number
             volume[part] = np.linalg.det(x[:, 1:] - x[:, :1])
-        longest_edge[part] = np.sqrt(((x[:, one] - x[:, other]) ** 2).sum(axis=2).max(axis=1))
+        longest_edge[part] = np.sqrt(((x[:, start] - x[:, end]) ** 2).sum(axis=2).max(axis=1))
     is_flat = np.abs(volume) <= _FLAT * longest_edge ** points.shape[1]
     if is_flat.any():
         worst_cell = int(np.argmax(is_flat))
@@ -176,12 +176,12 @@ def mesh_doubts(points: Floats, cells: Ints, facets: Ints, owner: Ints) -> list[
         np.maximum.at(smallest_distance, column, size)
     messages = []
     tree = cKDTree(points)
-    distance, other = tree.query(points[number], k=2)
+    distance, partner = tree.query(points[number], k=2)
     twin = distance[:, 1] <= _SAME * smallest_distance[number]
     if twin.any():
         i = int(np.argmax(twin))
         pair = sorted(
-            map(int, (number[i], other[i, 1] if other[i, 0] == number[i] else other[i, 0]))
+            map(int, (number[i], partner[i, 1] if partner[i, 0] == number[i] else partner[i, 0]))
         )
         messages.append(
             f"points {pair[0]} and {pair[1]} of the mesh both lie at {at(points[number[i]])} "
@@ -256,9 +256,9 @@ def _overlapping_cells(points: Floats, cells: Ints, owner: Ints, corner: Floats)
 def pairs_within(tree: cKDTree, x: Floats, reach: Floats) -> tuple[Ints, Ints]:
     """Pairs of places and points of a tree no farther from them than a reach."""
     neighbours = tree.query_ball_point(x, reach)
-    row, _ = ranges(np.array([len(one) for one in neighbours], dtype=np.int64))
-    every = [np.asarray(one, dtype=np.int64) for one in neighbours]
-    return row, np.concatenate([np.zeros(0, dtype=np.int64), *every])
+    row, _ = ranges(np.array([len(rows) for rows in neighbours], dtype=np.int64))
+    all_rows = [np.asarray(rows, dtype=np.int64) for rows in neighbours]
+    return row, np.concatenate([np.zeros(0, dtype=np.int64), *all_rows])
 
 
 def unused_sets(cell_sets: Mapping[str, Ints], n_cells: int) -> list[str]:

@@ -76,9 +76,9 @@ class CurvedFacets:
         """Pieces that have each node: offsets, pieces, and the number of the node in them."""
         members = self.facets.ravel()
         order = np.argsort(members, kind="stable")
-        piece, local = np.divmod(order, self.facets.shape[1])
+        piece, number = np.divmod(order, self.facets.shape[1])
         begin = offsets(np.bincount(members, minlength=len(self.points)))
-        return lock(begin), lock(piece), lock(local)
+        return lock(begin), lock(piece), lock(number)
 
     @cached_property
     def _balls(self) -> tuple[Floats, Floats]:
@@ -92,7 +92,7 @@ class CurvedFacets:
         """Curves where a surface ends; None of a curve, and of a closed surface."""
         if self.facets.shape[1] < 15:
             return None
-        edges = np.concatenate([self.facets[:, each] for each in _edge_nodes()])
+        edges = np.concatenate([self.facets[:, nodes] for nodes in _edge_nodes()])
         ends = np.sort(edges[:, :2], axis=1)
         _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
         border_edges = edges[first[count == 1]]
@@ -135,7 +135,7 @@ class Lattice:
     edges: Ints
 
     @property
-    def inner(self) -> int:
+    def first_inner_node(self) -> int:
         """Number of the first node inside a triangle."""
         return len(self.corner) + 3 * len(self.edges)
 
@@ -143,23 +143,23 @@ class Lattice:
 def lattice(points: Floats, facets: Ints) -> Lattice:
     """Nodes of pieces on straight facets `(k, d)`."""
     d = facets.shape[1]
-    corner, local = np.unique(facets, return_inverse=True)
-    local = local.reshape(facets.shape)
+    corner, local_corners = np.unique(facets, return_inverse=True)
+    local_corners = local_corners.reshape(facets.shape)
     pairs = local_edges(d - 1)
-    ends = local[:, pairs]
+    ends = local_corners[:, pairs]
     is_turned = ends[..., 0] > ends[..., 1]
     edges, number = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
     number = number.reshape(len(facets), len(pairs))
     quarter = np.where(is_turned[..., None], [2, 1, 0], [0, 1, 2])
     first = len(corner) + 3 * number[..., None] + quarter
-    nodes = [local, first.reshape(len(facets), -1)]
+    nodes = [local_corners, first.reshape(len(facets), -1)]
     if d == 3:
-        inner = len(corner) + 3 * len(edges) + np.arange(3 * len(facets)).reshape(-1, 3)
-        nodes.append(inner)
-    every = np.concatenate(nodes, axis=1)
-    x = np.empty((int(every.max(initial=-1)) + 1, points.shape[1]))
-    x[every] = np.einsum("ac,kcd->kad", _lattice_places(d), points[facets])
-    return Lattice(x, every, corner, edges)
+        inner_nodes = len(corner) + 3 * len(edges) + np.arange(3 * len(facets)).reshape(-1, 3)
+        nodes.append(inner_nodes)
+    all_nodes = np.concatenate(nodes, axis=1)
+    x = np.empty((int(all_nodes.max(initial=-1)) + 1, points.shape[1]))
+    x[all_nodes] = np.einsum("ac,kcd->kad", _lattice_places(d), points[facets])
+    return Lattice(x, all_nodes, corner, edges)
 
 
 def _lattice_places(n: int) -> Floats:
@@ -167,8 +167,8 @@ def _lattice_places(n: int) -> Floats:
     corner = np.eye(n)
     edges = [(k * corner[a] + (4 - k) * corner[b]) / 4
              for a, b in combinations(range(n), 2) for k in (3, 2, 1)]  # fmt: skip
-    inner = [(corner + 1) / 4 for _ in combinations(range(n), 3)]
-    return np.vstack([corner, *edges, *inner])
+    inner_nodes = [(corner + 1) / 4 for _ in combinations(range(n), 3)]
+    return np.vstack([corner, *edges, *inner_nodes])
 
 
 def arcs(a: Floats, middle: Floats, b: Floats) -> Floats:
@@ -205,7 +205,7 @@ def _with_insides(points: Floats, facets: Ints) -> Floats:
     for node, (k, i, j) in zip(facets[:, 12:].T, _INNER):
         bary = np.full(3, 0.25)
         bary[k] = 0.5
-        one, other = (points[facets[:, middle[min(k, c), max(k, c)]]] for c in (i, j))
+        start, end = (points[facets[:, middle[min(k, c), max(k, c)]]] for c in (i, j))
         top = points[facets[:, middle[min(i, j), max(i, j)]]]
         chord = points[facets[:, j]] - points[facets[:, i]]
         rise = top - (points[facets[:, i]] + points[facets[:, j]]) / 2
@@ -218,11 +218,11 @@ def _with_insides(points: Floats, facets: Ints) -> Floats:
         height = np.einsum("kd,kd->k", rise, edge_normal)
         half = np.linalg.norm(chord, axis=1) / 2
         curvature = 2 * height / (half**2 + np.einsum("kd,kd->k", rise, rise))
-        reach = np.linalg.norm(other - one, axis=1) / 2
+        reach = np.linalg.norm(end - start, axis=1) / 2
         bend = np.minimum(np.abs(curvature * reach), 1.0)
         lift = curvature * reach**2 / (1 + np.sqrt(1 - bend**2))
         tangential_rise = rise - height[:, None] * edge_normal
-        x[node] = (one + other) / 2 + tangential_rise / 4 + lift[:, None] * node_normal
+        x[node] = (start + end) / 2 + tangential_rise / 4 + lift[:, None] * node_normal
     return x
 
 
@@ -260,7 +260,7 @@ def raised_lattice(mesh: Mesh, facets: Ints, pairs: Ints, middles: Floats) -> La
     place[has_row] = middles[row[has_row]]
     points, count = grid.points.copy(), len(grid.corner)
     arc = arcs(mesh.points[ends[:, 0]], place, mesh.points[ends[:, 1]])
-    points[count : grid.inner] = arc.reshape(-1, mesh.dim)
+    points[count : grid.first_inner_node] = arc.reshape(-1, mesh.dim)
     if mesh.dim == 3:
         points = _with_insides(points, grid.facets)
     return replace(grid, points=points)
@@ -315,9 +315,9 @@ def with_curves(mesh: Mesh, facets: Ints, nodes: Lattice) -> Mesh:
         groups[name], facet_sets[name] = sides, facets[np.isin(side, sides)]
     curves = {}
     for name, sides in groups.items():
-        point_numbers, local = np.unique(pieces[np.isin(side, sides)], return_inverse=True)
+        point_numbers, local_pieces = np.unique(pieces[np.isin(side, sides)], return_inverse=True)
         curves[name] = CurvedFacets(
-            lock(nodes.points[point_numbers]), lock(local.reshape(-1, pieces.shape[1]))
+            lock(nodes.points[point_numbers]), lock(local_pieces.reshape(-1, pieces.shape[1]))
         )
     return sound_mesh(mesh.points, mesh.cells, facet_sets, mesh.cell_sets, curves)
 
@@ -347,9 +347,9 @@ def _smooth_sides(mesh: Mesh, facets: Ints, curve: CurvedFacets) -> Ints:
     _, group, members = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(group.ravel(), kind="stable")
     begin = np.concatenate([[0], np.cumsum(members)])[:-1][members == 2]
-    one, other = order[begin], order[begin + 1]
-    is_smooth = np.einsum("jd,jd->j", normal[one], normal[other]) > _SHARP
-    links = (np.ones(int(is_smooth.sum())), (owner[one[is_smooth]], owner[other[is_smooth]]))
+    a, b = order[begin], order[begin + 1]
+    is_smooth = np.einsum("jd,jd->j", normal[a], normal[b]) > _SHARP
+    links = (np.ones(int(is_smooth.sum())), (owner[a[is_smooth]], owner[b[is_smooth]]))
     return np.asarray(
         connected_components(coo_array(links, shape=(count, count)), directed=False)[1],
         dtype=np.int64,
@@ -394,8 +394,8 @@ def _meeting_sides(mesh: Mesh, facets: Ints, side: Ints) -> Bools:
     x = mesh.points[facets]
     size = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2).max(axis=1)
     row, partner = pairs_within(cKDTree(x.mean(axis=1)), x.mean(axis=1), size)
-    other = side[row] != side[partner]
-    result[side[row[other]], side[partner[other]]] = True
+    is_other_side = side[row] != side[partner]
+    result[side[row[is_other_side]], side[partner[is_other_side]]] = True
     return result | result.T
 
 

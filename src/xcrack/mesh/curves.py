@@ -120,7 +120,7 @@ def on_curves(
     cells: Ints,
     is_new: Bools,
     sets: Mapping[str, Ints],
-    outer: Ints,
+    boundary: Ints,
     curves: Curves,
     size: float,
 ) -> tuple[Floats, Bools, Ints]:
@@ -137,7 +137,7 @@ def on_curves(
         Points that may be moved.
     sets : mapping of str to (k, d) array of int
         Facets of the sets with a curve.
-    outer : (k, d) array of int
+    boundary : (k, d) array of int
         All facets of the boundary.
     curves : mapping of str to callable
     size : float, length
@@ -167,7 +167,7 @@ def on_curves(
     )
     if not len(moving_points):
         return points, np.zeros(len(points), dtype=bool), moving_points
-    plane, normal = _other_sides(points, moving_points, sets, outer)
+    plane, normal = _other_sides(points, moving_points, sets, boundary)
     x = points.copy()
     for _ in range(_PASSES):
         earlier_places = x[moving_points]
@@ -180,7 +180,7 @@ def on_curves(
             break
     is_moved = np.zeros(len(points), dtype=bool)
     is_moved[moving_points] = (x[moving_points] != points[moving_points]).any(axis=1)
-    x, flat_points = _unfolded_points(points, x, cells, is_moved, outer)
+    x, flat_points = _unfolded_points(points, x, cells, is_moved, boundary)
     return x, np.asarray((x != points).any(axis=1)), flat_points
 
 
@@ -201,13 +201,13 @@ def _curves_of_points(curve: Curve, facets: Ints, is_new: Bools) -> list[tuple[C
 
 
 def _other_sides(
-    points: Floats, point_numbers: Ints, sets: Mapping[str, Ints], outer: Ints
+    points: Floats, point_numbers: Ints, sets: Mapping[str, Ints], boundary: Ints
 ) -> tuple[Ints, Floats]:
     """New points at a sharp edge to a side without a curve, and that side's normal."""
     curved_facets = np.unique(np.sort(np.concatenate(list(sets.values())), axis=1), axis=0)
-    every = np.concatenate([curved_facets, np.sort(outer, axis=1)])
-    _, start, count = np.unique(every, axis=0, return_index=True, return_counts=True)
-    flat_facets = every[start[(count == 1) & (start >= len(curved_facets))]]
+    all_facets = np.concatenate([curved_facets, np.sort(boundary, axis=1)])
+    _, start, count = np.unique(all_facets, axis=0, return_index=True, return_counts=True)
+    flat_facets = all_facets[start[(count == 1) & (start >= len(curved_facets))]]
     number = np.full(len(points), -1, dtype=np.int64)
     number[point_numbers] = np.arange(len(point_numbers))
     sides = []
@@ -219,9 +219,11 @@ def _other_sides(
             at_new = number[column] >= 0
             mean[number[column[at_new]]] = vector[at_new]
         sides.append(mean)
-    side_here, other = sides
-    has_side = (other != 0).any(axis=1) & (np.abs((side_here * other).sum(axis=1)) < _SHARP)
-    return point_numbers[has_side], other[has_side]
+    curved_normal, flat_normal = sides
+    has_side = (flat_normal != 0).any(axis=1) & (
+        np.abs((curved_normal * flat_normal).sum(axis=1)) < _SHARP
+    )
+    return point_numbers[has_side], flat_normal[has_side]
 
 
 def _normals(corner: Floats) -> Floats:
@@ -234,7 +236,7 @@ def _normals(corner: Floats) -> Floats:
 
 
 def _unfolded_points(
-    points: Floats, target: Floats, cells: Ints, is_moved: Bools, outer: Ints
+    points: Floats, target: Floats, cells: Ints, is_moved: Bools, boundary: Ints
 ) -> tuple[Floats, Ints]:
     """Points that are moved, and inner ones that follow where a cell would be folded or flattened.
 
@@ -267,21 +269,21 @@ def _unfolded_points(
             is_moved[points_back] = False
             flat_points.append(points_back)
         x = np.where(is_moved[:, None], target, points)
-        _let_follow(points, x, cells, region, outer)
+        _let_follow(points, x, cells, region, boundary)
 
 
-def _let_follow(points: Floats, x: Floats, cells: Ints, region: Ints, outer: Ints) -> None:
+def _let_follow(points: Floats, x: Floats, cells: Ints, region: Ints, boundary: Ints) -> None:
     """Move the inner points of a region by means of the moves around them (in place)."""
     is_beyond = np.ones(len(cells), dtype=bool)
     is_beyond[region] = False
     is_free = np.zeros(len(points), dtype=bool)
     is_free[cells[region]] = True
     is_free[cells[is_beyond]] = False
-    is_free[outer] = False
+    is_free[boundary] = False
     number, corner = np.unique(cells[region], return_inverse=True)
     corner = corner.reshape(len(region), -1)
-    one, other = np.array(list(combinations(range(cells.shape[1]), 2))).T
-    i, j = corner[:, one].ravel(), corner[:, other].ravel()
+    start, end = np.array(list(combinations(range(cells.shape[1]), 2))).T
+    i, j = corner[:, start].ravel(), corner[:, end].ravel()
     weight = 1 / ((points[number[i]] - points[number[j]]) ** 2).sum(axis=1)
     rows, columns = np.concatenate([i, j]), np.concatenate([j, i])
     links = coo_array((np.tile(weight, 2), (rows, columns)), shape=(len(number),) * 2).tocsr()

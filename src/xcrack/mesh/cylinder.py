@@ -230,9 +230,9 @@ def _with_sets(
     height = np.sin(angle) * y - np.cos(angle) * z - radius * np.cos(_TURN / 2)
     on_face = (abs(height) < tolerance).all(axis=-1)
     _, *limits = sections
-    for station, (high, low) in (("outer", limits[:2]), ("inner", limits[2:])):
+    for station, (x1, x0) in (("outer", limits[:2]), ("inner", limits[2:])):
         for side, position in (("left", -x), ("right", x)):
-            is_in_notch = ((position > low - tolerance) & (position < high + tolerance)).all(axis=1)
+            is_in_notch = ((position > x0 - tolerance) & (position < x1 + tolerance)).all(axis=1)
             for k in range(_FACES):
                 sets[f"{station}_{side}_{k:02d}"] = facets[is_in_notch & on_face[k]]
     return sound_mesh(points, cells, sets, curves={"round": round_side})

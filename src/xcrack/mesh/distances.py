@@ -128,7 +128,7 @@ def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> NearestPo
 
     # A copy is never read-only, for which the kernel would be compiled once more.
     points = np.array(x, dtype=float, order="C")
-    nearest = _in_parts(
+    arrays = _in_parts(
         closest_triangle,
         points,
         tree.corners,
@@ -137,7 +137,7 @@ def closest_in(tree: TriangleTree, x: Floats, band: float = np.inf) -> NearestPo
         float(band),
         tree.distance_tolerance,
     )
-    return NearestPoint(*nearest)
+    return NearestPoint(*arrays)
 
 
 def _in_parts(kernel: Callable[..., Any], x: Floats, *arguments: Any) -> tuple[Any, ...]:

@@ -82,28 +82,28 @@ class Field:
     def _nearest_cells(self, x: Floats) -> tuple[Ints, Floats]:
         """Nearest cells of points outside, and the places in them: curved sides are polygons."""
         mesh = self.mesh
-        nearest = np.atleast_2d(mesh.cell_tree.query(x, k=min(_NEAR, len(mesh.cells)))[1])
-        nearest = nearest.reshape(len(x), -1)
-        count = nearest.shape[1]
-        trial = barycentric(mesh, nearest.ravel(), np.repeat(x, count, axis=0))
+        nearest_cells = np.atleast_2d(mesh.cell_tree.query(x, k=min(_NEAR, len(mesh.cells)))[1])
+        nearest_cells = nearest_cells.reshape(len(x), -1)
+        count = nearest_cells.shape[1]
+        trial = barycentric(mesh, nearest_cells.ravel(), np.repeat(x, count, axis=0))
         trial = np.maximum(trial, 0.0)
         trial /= trial.sum(axis=1, keepdims=True)
-        place = np.einsum("kb,kbd->kd", trial, mesh.points[mesh.cells[nearest.ravel()]])
+        place = np.einsum("kb,kbd->kd", trial, mesh.points[mesh.cells[nearest_cells.ravel()]])
         distance = np.linalg.norm(place - np.repeat(x, count, axis=0), axis=1).reshape(-1, count)
-        best = np.argmin(distance, axis=1)
+        column = np.argmin(distance, axis=1)
         row = np.arange(len(x))
-        cell = nearest[row, best]
-        is_far = distance[row, best] > _BESIDE * mesh.cell_size[cell]
+        cell = nearest_cells[row, column]
+        is_far = distance[row, column] > _BESIDE * mesh.cell_size[cell]
         if is_far.any():
-            i = int(np.argmax(np.where(is_far, distance[row, best], 0)))
+            i = int(np.argmax(np.where(is_far, distance[row, column], 0)))
             raise ProblemError(
                 f"field {self.name} does not cover the body: {int(is_far.sum())} of the points "
                 f"asked for lie beside its mesh, the farthest at {at(x[i])}, "
-                f"{distance[i, best[i]]:.4g} away (its mesh reaches from "
+                f"{distance[i, column[i]]:.4g} away (its mesh reaches from "
                 f"{at(mesh.points.min(axis=0))} to {at(mesh.points.max(axis=0))}). Check units and "
                 f"position, or give a field of the whole body."
             )
-        return cell, trial.reshape(len(x), count, -1)[row, best]
+        return cell, trial.reshape(len(x), count, -1)[row, column]
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,9 +284,9 @@ def _values_of_shape(values: Any, n: int, top: int, source: str) -> Floats:
 def _field(
     points: Floats, blocks: list[tuple[str, Ints]], values: Floats, top: int, name: str
 ) -> Field:
-    second = {kind for kind, data in blocks if len(data)}
+    kinds = {kind for kind, data in blocks if len(data)}
     nodes, n_given = None, len(points)
-    if len(second) == 1 and second <= {"triangle6", "tetra10"}:
+    if len(kinds) == 1 and kinds <= {"triangle6", "tetra10"}:
         nodes = np.concatenate([data for _, data in blocks])
     else:
         raw_mesh = _cells_as_simplices(RawMesh(points, blocks), name)
@@ -334,9 +334,9 @@ def _with_middles(values: Floats, nodes: Ints, n_given: int, n: int) -> Floats:
     middle_values = np.zeros((n - n_given, *values.shape[1:]))
     count = np.zeros(n - n_given)
     for column in range(nodes.shape[1]):
-        for other in range(nodes.shape[1]):
-            rows = (nodes[:, column] >= n_given) & (nodes[:, other] < n_given)
-            np.add.at(middle_values, nodes[rows, column] - n_given, values[nodes[rows, other]])
+        for corner in range(nodes.shape[1]):
+            rows = (nodes[:, column] >= n_given) & (nodes[:, corner] < n_given)
+            np.add.at(middle_values, nodes[rows, column] - n_given, values[nodes[rows, corner]])
             np.add.at(count, nodes[rows, column] - n_given, 1)
     middle_values /= np.maximum(count, 1).reshape(-1, *[1] * (values.ndim - 1))
     return np.concatenate([values, middle_values])

@@ -441,8 +441,8 @@ def with_stored_curves(mesh: Mesh, path: Path) -> Mesh:
             "more, and are left out: the file was changed since it was written."
         )
     facet_sets = {name: facets for name, facets in mesh.facet_sets.items() if name != "boundary"}
-    every = {**mesh.curves, **fitting}
-    return sound_mesh(mesh.points, mesh.cells, facet_sets, mesh.cell_sets, every)
+    all_curves = {**mesh.curves, **fitting}
+    return sound_mesh(mesh.points, mesh.cells, facet_sets, mesh.cell_sets, all_curves)
 
 
 def _gmsh_names(path: Path) -> dict[tuple[int, int], str]:

@@ -31,7 +31,7 @@ class RoundHole:
     section: Floats
     radius: float
 
-    def local(self, x: Floats) -> Floats:
+    def section_places(self, x: Floats) -> Floats:
         """Places from the axis in the section `(n, 2)`."""
         return np.asarray(x @ self.section.T - self.centre)
 
@@ -71,7 +71,7 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
             f"{what}: the set is not a round hole: its points lie up to {100 * deviation:.3g} % of "
             f"the radius {radius:.4g} off the best circle. Give the facets of one hole."
         )
-    middle = hole.local(mesh.points[facets].mean(axis=1))
+    middle = hole.section_places(mesh.points[facets].mean(axis=1))
     if (np.einsum("ks,ks->k", middle, area @ section.T) > 0).any():
         raise ProblemError(
             f"{what}: the set is round, but no hole: the body lies inside of it, at least in "

@@ -126,7 +126,7 @@ def numbers_of_text(text: str) -> str:
     return _FORTRAN.sub("e", text)
 
 
-def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
+def keywords_of(path: Path, parents: tuple[Path, ...] = ()) -> Iterator[Keyword]:
     """Keywords of an Abaqus or CalculiX deck in their order, those of included files in place.
 
     Raises
@@ -134,12 +134,12 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
     MeshError
         A file that is not there or includes itself, data before the first keyword.
     """
-    if len(outer) > _DEEPEST:
+    if len(parents) > _DEEPEST:
         raise MeshError(
-            f"{path.name} is included by {len(outer)} files, one in the other: join some of them."
+            f"{path.name} is included by {len(parents)} files, one in the other: join some of them."
         )
     resolved_path = path.resolve()
-    if resolved_path in outer:
+    if resolved_path in parents:
         raise MeshError(f"{path.name} includes itself: leave that *INCLUDE out.")
     keyword: Keyword | None = None
     open_line: tuple[int, str] | None = None  # a keyword line that goes on
@@ -152,7 +152,7 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
             open_line = None
         elif open_line is not None:  # the comma at its end was one too many
             if keyword is not None:
-                yield from _complete_keyword(keyword, (*outer, resolved_path))
+                yield from _complete_keyword(keyword, (*parents, resolved_path))
             keyword = _keyword(open_line[1], path, open_line[0])
             open_line = None
         if not text.startswith("*"):
@@ -167,14 +167,14 @@ def keywords_of(path: Path, outer: tuple[Path, ...] = ()) -> Iterator[Keyword]:
             open_line = (number, text)
             continue
         if keyword is not None:
-            yield from _complete_keyword(keyword, (*outer, resolved_path))
+            yield from _complete_keyword(keyword, (*parents, resolved_path))
         keyword = _keyword(text, path, number)
     if open_line is not None:
         if keyword is not None:
-            yield from _complete_keyword(keyword, (*outer, resolved_path))
+            yield from _complete_keyword(keyword, (*parents, resolved_path))
         keyword = _keyword(open_line[1].rstrip(","), path, open_line[0])
     if keyword is not None:
-        yield from _complete_keyword(keyword, (*outer, resolved_path))
+        yield from _complete_keyword(keyword, (*parents, resolved_path))
 
 
 def _lines(path: Path) -> Sequence[str]:
@@ -193,7 +193,7 @@ def _keyword(text: str, path: Path, line: int) -> Keyword:
     return Keyword(name, options, [], path, line)
 
 
-def _complete_keyword(keyword: Keyword, outer: tuple[Path, ...]) -> Iterator[Keyword]:
+def _complete_keyword(keyword: Keyword, parents: tuple[Path, ...]) -> Iterator[Keyword]:
     """A keyword with the data of the file that it names, or the keywords of an included one."""
     input_name = keyword.options.get("INPUT", "")
     if not input_name:
@@ -201,17 +201,17 @@ def _complete_keyword(keyword: Keyword, outer: tuple[Path, ...]) -> Iterator[Key
             keyword.refuse("the parameter INPUT is missing: write *INCLUDE, INPUT=file.inp.")
         yield keyword
         return
-    inner = keyword.path.parent / input_name
-    if not inner.is_file():
+    included_path = keyword.path.parent / input_name
+    if not included_path.is_file():
         keyword.refuse(
-            f"the file {str(inner)!r} does not exist: put it beside {keyword.path.name}."
+            f"the file {str(included_path)!r} does not exist: put it beside {keyword.path.name}."
         )
     if keyword.name == "INCLUDE":
-        yield from keywords_of(inner, outer)
+        yield from keywords_of(included_path, parents)
         return
     data = [
         (number, text.strip())
-        for number, text in enumerate(_lines(inner), 1)
+        for number, text in enumerate(_lines(included_path), 1)
         if text.strip() and not text.strip().startswith("*")
     ]
     yield Keyword(keyword.name, keyword.options, [*keyword.data, *data], keyword.path, keyword.line)

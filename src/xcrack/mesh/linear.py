@@ -116,8 +116,8 @@ def linear_mesh(raw_mesh: RawMesh, source: str, strict: bool) -> RawMesh:
         Elements to change where `strict`, a damaged file, cells that are inside out.
     """
     shapes = {kind: base for kind, _ in raw_mesh.blocks if (base := base_kind(kind)) is not None}
-    other = {kind: base for kind, base in shapes.items() if kind not in _SIMPLICES}
-    counts = {k: sum(len(d) for kind, d in raw_mesh.blocks if kind == k) for k in other}
+    bases = {kind: base for kind, base in shapes.items() if kind not in _SIMPLICES}
+    counts = {k: sum(len(d) for kind, d in raw_mesh.blocks if kind == k) for k in bases}
     if not sum(counts.values()):
         return raw_mesh
     if strict:
@@ -133,12 +133,12 @@ def linear_mesh(raw_mesh: RawMesh, source: str, strict: bool) -> RawMesh:
     curved_blocks = [
         _curved_edges(raw_mesh.points, kind, data, source)
         for kind, data in raw_mesh.blocks
-        if kind in other and SHAPES[other[kind]].dim == top and len(data)
+        if kind in bases and SHAPES[bases[kind]].dim == top and len(data)
     ]
     pairs, middles, bulge = _joined_edges(curved_blocks)
     entries = [*raw_mesh.blocks, *((kind, data) for kind, _, data in raw_mesh.sets)]
     corners = [
-        (shapes[kind], data[:, : SHAPES[shapes[kind]].corners]) if kind in other else (kind, data)
+        (shapes[kind], data[:, : SHAPES[shapes[kind]].corners]) if kind in bases else (kind, data)
         for kind, data in entries
     ]
     plane = _SOLIDS.isdisjoint(shapes.values()) and _is_plane(raw_mesh.points)
@@ -155,8 +155,8 @@ def linear_mesh(raw_mesh: RawMesh, source: str, strict: bool) -> RawMesh:
         begin = np.concatenate([[0], np.cumsum([len(corners[i][1]) for i in rows])])
         limits = np.searchsorted(parent, begin)
         kind = "tetra" if base in _SOLIDS else "triangle"
-        for i, first, last in zip(rows, limits, limits[1:], strict=False):
-            split[i] = (kind, pieces[first:last])
+        for i, first, stop in zip(rows, limits, limits[1:], strict=False):
+            split[i] = (kind, pieces[first:stop])
     all_entries = [split.get(i, entry) for i, entry in enumerate(corners)]
     blocks = all_entries[: len(raw_mesh.blocks)]
     names = [name for _, name, _ in raw_mesh.sets]
@@ -230,8 +230,8 @@ def _joined_edges(parts: Sequence[_CurvedEdges]) -> _CurvedEdges:
     if not parts:
         return np.zeros((0, 2), np.int64), np.zeros((0, 3)), (0.0, 0.0)
     pairs, middles, bulges = zip(*parts, strict=True)
-    every, first = np.unique(np.concatenate(pairs), axis=0, return_index=True)
-    return every, np.concatenate(middles)[first], max(bulges)
+    all_pairs, first = np.unique(np.concatenate(pairs), axis=0, return_index=True)
+    return all_pairs, np.concatenate(middles)[first], max(bulges)
 
 
 def _curved_edges(points: Floats, kind: str, data: Ints, source: str) -> _CurvedEdges:
@@ -272,8 +272,8 @@ def _curved_edges(points: Floats, kind: str, data: Ints, source: str) -> _Curved
     is_curved = share > _STRAIGHT
     listed_pairs = np.sort(pairs[is_curved], axis=1).astype(np.int64)
     listed_pairs, first = np.unique(listed_pairs, axis=0, return_index=True)
-    largest = (float(share[worst_edge]), float(offset[worst_edge])) if count else (0.0, 0.0)
-    return listed_pairs, middles[is_curved][first], largest
+    bulge = (float(share[worst_edge]), float(offset[worst_edge])) if count else (0.0, 0.0)
+    return listed_pairs, middles[is_curved][first], bulge
 
 
 def _order_of(kind: str, nodes: int) -> int:
@@ -297,23 +297,23 @@ def _nodes_of_edges(x: Floats, ends: Floats, order: int) -> list[list[int]] | No
         mean_offset = np.median(middle / np.sqrt(square), axis=0)
     edge = np.argmin(mean_offset, axis=1)
     slots = [np.nonzero(edge == k)[0].tolist() for k in range(ends.shape[1])]
-    return slots if all(len(each) == order - 1 for each in slots) else None
+    return slots if all(len(slot) == order - 1 for slot in slots) else None
 
 
 def _middles(x: Floats, ends: Floats, slots: list[list[int]]) -> Floats:
     """Middle of each edge: its node there, or what a polynomial through two beside it says."""
     order = len(slots[0]) + 1
     result = np.empty((len(x), len(slots), x.shape[2]))
-    for k, each in enumerate(slots):
+    for k, slot in enumerate(slots):
         a, b = ends[:, k, 0], ends[:, k, 1]
-        from_middle = np.linalg.norm(x[:, each] - ((a + b) / 2)[:, None], axis=2).mean(axis=0)
-        by_distance = np.array(each)[np.argsort(from_middle, kind="stable")]
+        from_middle = np.linalg.norm(x[:, slot] - ((a + b) / 2)[:, None], axis=2).mean(axis=0)
+        by_distance = np.array(slot)[np.argsort(from_middle, kind="stable")]
         if order % 2 == 0:
             result[:, k] = x[:, by_distance[0]]
             continue
         t = (order - 1) / (2 * order)  # of the node before the middle, and 1 - t of that behind it
-        outer = (0.5 - t) ** 2 / (2 * t * (1 - t))
-        result[:, k] = (0.5 + outer) * (x[:, by_distance[0]] + x[:, by_distance[1]]) - outer * (
+        share = (0.5 - t) ** 2 / (2 * t * (1 - t))
+        result[:, k] = (0.5 + share) * (x[:, by_distance[0]] + x[:, by_distance[1]]) - share * (
             a + b
         )
     return result
@@ -428,10 +428,10 @@ def _triangles(points: Floats, rows: Ints, plane: bool, source: str) -> tuple[In
         quality = [
             _worst_shape(points, p, k) for p, k in ((pieces, keep), (pieces_turned, keep_turned))
         ]
-        other = quality[1] > quality[0] + 1e-9
+        is_better = quality[1] > quality[0] + 1e-9
         pieces, keep = (
-            np.where(other[:, None, None], pieces_turned, pieces),
-            np.where(other[:, None], keep_turned, keep),
+            np.where(is_better[:, None, None], pieces_turned, pieces),
+            np.where(is_better[:, None], keep_turned, keep),
         )
         is_folded = np.maximum(*quality) <= 0
         if is_folded.any():

@@ -47,9 +47,9 @@ def cells_at(mesh: Mesh, x: Floats) -> Ints:
     """Cell of each point `(k,)`; the nearest where none has it."""
     cell, _ = locate(mesh, x)
     if (cell < 0).any():
-        _, nearest = mesh.cell_tree.query(x[cell < 0])
+        _, nearest_cells = mesh.cell_tree.query(x[cell < 0])
         cell = np.array(cell)
-        cell[cell < 0] = nearest
+        cell[cell < 0] = nearest_cells
     return cell
 
 
@@ -117,9 +117,9 @@ def parts_inside(mesh: Mesh, polyline: Floats) -> list[Floats]:
             middle = (ends[:-1] + ends[1:]) / 2
             middles.append(p[first + k] + middle[:, None] * r[first + k])
     is_inside = contains(mesh, np.concatenate(middles))
-    last = np.cumsum([len(each) for each in pairs])[:-1]
+    cuts = np.cumsum([len(span) for span in pairs])[:-1]
     return [
-        each[chunk_rows] for each, chunk_rows in zip(pairs, np.split(is_inside, last), strict=True)
+        span[chunk_rows] for span, chunk_rows in zip(pairs, np.split(is_inside, cuts), strict=True)
     ]
 
 

@@ -154,25 +154,25 @@ class Mesh:
 
     @cached_property
     def _edges_and_map(self) -> tuple[Ints, Ints]:
-        local = local_edges(self.dim)
-        if self.facets.shape[1] == local.shape[1]:  # in 2D each edge is a facet
+        edge_ends = local_edges(self.dim)
+        if self.facets.shape[1] == edge_ends.shape[1]:  # in 2D each edge is a facet
             return self.facets, lock(np.ascontiguousarray(self.cell_to_facet[:, ::-1]))
-        key = np.empty((len(self.cells), len(local)), dtype=np.int64)
+        key = np.empty((len(self.cells), len(edge_ends)), dtype=np.int64)
         for part in row_stretches(len(self.cells)):
-            pairs = np.sort(self.cells[part][:, local], axis=2)
+            pairs = np.sort(self.cells[part][:, edge_ends], axis=2)
             key[part] = pairs[:, :, 0] * np.int64(self.n_points) + pairs[:, :, 1]
         edge_keys, inverse = np.unique(key, return_inverse=True)
         edges = np.stack([edge_keys // self.n_points, edge_keys % self.n_points], axis=1)
-        return lock(edges), lock(inverse.reshape(len(self.cells), len(local)))
+        return lock(edges), lock(inverse.reshape(len(self.cells), len(edge_ends)))
 
     @cached_property
     def _facets(self) -> tuple[Ints, Ints, Ints]:
         """Sorted facets `(f, d)`, their cells `(f, 2)` (-1: none), facet numbers `(m, d + 1)`."""
         d = self.dim
-        local = local_facets(d)
+        corners = local_facets(d)
         key = np.empty((len(self.cells), d + 1), dtype=np.int64)
         for part in row_stretches(len(self.cells)):
-            facets = np.sort(self.cells[part][:, local], axis=2)
+            facets = np.sort(self.cells[part][:, corners], axis=2)
             key[part] = _scalar_key(facets.reshape(-1, d), self.n_points).reshape(-1, d + 1)
         facet_keys = key.ravel()
         order = np.argsort(facet_keys, kind="stable")
@@ -182,7 +182,7 @@ class Mesh:
         counts = np.diff(np.append(begin, len(facet_keys)))
         first = order[begin]
         facet_corners = np.sort(
-            self.cells[first[:, None] // (d + 1), local[first % (d + 1)]], axis=1
+            self.cells[first[:, None] // (d + 1), corners[first % (d + 1)]], axis=1
         )
         if counts.max(initial=0) > 2:
             raise MeshError(
@@ -239,9 +239,9 @@ class Mesh:
         """Gradients of the barycentric coordinates of each cell `(m, d + 1, d)`, 1/length."""
         gradient = np.empty((*self.cells.shape, self.dim))
         for part in row_stretches(len(gradient)):
-            last = np.swapaxes(np.linalg.inv(self._edge_matrices(part)), 1, 2)
-            gradient[part, 1:] = last
-            gradient[part, 0] = -last.sum(axis=1)
+            inverse = np.swapaxes(np.linalg.inv(self._edge_matrices(part)), 1, 2)
+            gradient[part, 1:] = inverse
+            gradient[part, 0] = -inverse.sum(axis=1)
         return lock(gradient)
 
     @cached_property
@@ -300,12 +300,12 @@ class Mesh:
         """
         from xcrack.mesh.kernels.location import cells_in_bins
 
-        every = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
-        side = np.maximum(every[1] - every[0], 1e-300)
+        body_box = np.stack([self.points.min(axis=0), self.points.max(axis=0)])
+        side = np.maximum(body_box[1] - body_box[0], 1e-300)
         bins = 2 * len(self.cells) / factorial(self.dim)
         edge = (np.prod(side / side.max()) / bins) ** (1 / self.dim) * side.max()
         shape = np.clip(side / edge, 1, len(self.cells)).astype(np.int64)
-        return cells_in_bins(self.points, self.cells, every, shape), shape
+        return cells_in_bins(self.points, self.cells, body_box, shape), shape
 
     @cached_property
     def boundary_tree(self) -> tuple[TriangleTree, Floats]:
@@ -315,8 +315,8 @@ class Mesh:
         facets = self.facets[place]
         corner = self.points[facets]
         # Barycentric coordinates decrease towards the facet opposite to their corner.
-        local = np.argmax(self.cell_to_facet[cell] == place[:, None], axis=1)
-        inward_normal = self.gradient[cell, local]
+        corner_across = np.argmax(self.cell_to_facet[cell] == place[:, None], axis=1)
+        inward_normal = self.gradient[cell, corner_across]
         normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         is_turned = np.einsum("ij,ij->i", normal, inward_normal) > 0
         facets = np.where(is_turned[:, None], facets[:, ::-1], facets)
@@ -385,20 +385,20 @@ class Mesh:
         All have a positive volume here, so they do where they name its points in opposite turns:
         that takes no coordinates.
         """
-        local = local_facets(self.dim)
+        corners = local_facets(self.dim)
         is_odd = np.empty(self.cell_to_facet.shape, dtype=bool)
         for part in row_stretches(len(is_odd)):
-            a, b, *c = self.cells[part].T[local.T]
+            a, b, *c = self.cells[part].T[corners.T]
             is_turned = (a > b) ^ (a > c[0]) ^ (b > c[0]) if c else a > b
             is_turned[1::2] ^= True  # the corner across counts too
             is_odd[part] = is_turned.T
         balance = np.bincount(self.cell_to_facet.ravel(), is_odd.ravel(), len(self.facets))
         folded_facets = np.nonzero((balance != 1) & (self.facet_to_cell[:, 1] >= 0))[0]
         if len(folded_facets):
-            one, other = self.facet_to_cell[folded_facets[0]].tolist()
-            where = np.round(self.points[self.cells[other]].mean(axis=0), 6).tolist()
+            neighbour, cell = self.facet_to_cell[folded_facets[0]].tolist()
+            location = np.round(self.points[self.cells[cell]].mean(axis=0), 6).tolist()
             raise MeshError(
-                f"cell {other} at {where} is inverted: it folds over its neighbour {one} "
+                f"cell {cell} at {location} is inverted: it folds over its neighbour {neighbour} "
                 f"({len(folded_facets)} such pairs). Move its points back or remesh."
             )
 
@@ -412,11 +412,11 @@ class Mesh:
             )
         if name != "boundary":
             return
-        outer = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
-        if not np.array_equal(np.unique(number), outer):
+        boundary = np.nonzero(self.facet_to_cell[:, 1] < 0)[0]
+        if not np.array_equal(np.unique(number), boundary):
             raise MeshError(
                 f'facet set "boundary" has {len(np.unique(number))} facets, the boundary of the '
-                f"mesh has {len(outer)}: that name means all facets of one cell only, and every "
+                f"mesh has {len(boundary)}: that name means all facets of one cell only, and every "
                 "mesh makes the set itself. Leave it out, or give yours another name."
             )
 
@@ -486,8 +486,8 @@ def local_edges(dim: int) -> Ints:
 @cache
 def local_facets(dim: int) -> Ints:
     """Local vertex numbers of the facet opposite to each vertex, `(d + 1, d)`."""
-    every = range(dim + 1)
-    return lock(np.array([[j for j in every if j != i] for i in every], dtype=np.int64))
+    vertices = range(dim + 1)
+    return lock(np.array([[j for j in vertices if j != i] for i in vertices], dtype=np.int64))
 
 
 # Named sets of facets, and the mesh point nearest to a place.
@@ -508,13 +508,13 @@ def nearest_point(mesh: Mesh, x: Floats, what: str) -> int:
     if len(x) != mesh.dim:
         raise ProblemError(f"{what}: the point {x.tolist()} needs {mesh.dim} coordinates.")
     distance = np.linalg.norm(mesh.points - x, axis=1)
-    best = int(np.argmin(distance))
-    if distance[best] > mesh.cell_size.max():
+    number = int(np.argmin(distance))
+    if distance[number] > mesh.cell_size.max():
         raise ProblemError(
-            f"{what}: {x.tolist()} is {distance[best]:.4g} away from the nearest mesh point "
-            f"{mesh.points[best].tolist()}: give a point of the body."
+            f"{what}: {x.tolist()} is {distance[number]:.4g} away from the nearest mesh point "
+            f"{mesh.points[number].tolist()}: give a point of the body."
         )
-    return best
+    return number
 
 
 def nearest_nodes(mesh: Mesh, x: Floats, what: str) -> Ints:

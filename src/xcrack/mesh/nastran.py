@@ -201,7 +201,7 @@ def _cards(path: Path) -> Iterator[Card]:
 def _fields(text: str) -> tuple[str, list[str], int]:
     """First field of a line, those behind it, and how many it has room for."""
     if "," in text:
-        head, *fields = (each.strip() for each in text.split(","))
+        head, *fields = (entry.strip() for entry in text.split(","))
         n = 4 if head.endswith("*") or head.startswith("*") else 8
         return head, fields[:n], n
     head = text[:8].strip()
@@ -210,10 +210,10 @@ def _fields(text: str) -> tuple[str, list[str], int]:
     return head, [text[k : k + width].strip() for k in ends], n
 
 
-def _lines(path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, int, str]]:
+def _lines(path: Path, parents: tuple[Path, ...]) -> Iterator[tuple[Path, int, str]]:
     """Lines with file and number, without comments, those of included files in place."""
     path_here = path.resolve()
-    if path_here in outer or len(outer) > _DEEPEST:
+    if path_here in parents or len(parents) > _DEEPEST:
         raise MeshError(f"{path.name} includes itself: leave that INCLUDE out.")
     content = path.read_text(encoding="utf-8", errors="replace").expandtabs(8)
     for number, line in enumerate(content.splitlines(), 1):
@@ -230,7 +230,7 @@ def _lines(path: Path, outer: tuple[Path, ...]) -> Iterator[tuple[Path, int, str
                 f"{path.name}, line {number}: INCLUDE: there is no file {str(target)!r}: "
                 "put it there (paths begin at the file that names it)."
             )
-        yield from _lines(target, (*outer, path_here))
+        yield from _lines(target, (*parents, path_here))
 
 
 __all__ = ["read_nastran"]

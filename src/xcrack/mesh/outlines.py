@@ -146,8 +146,8 @@ def sides_of(outline: Any) -> list[Side]:
             )
         center, turn = (None, 0.0) if len(entry) == 1 else _arc(start, entry[0], end)
         first = (float(start[0]), float(start[1]))
-        last = sides[0].start if _is_first(sides, end, size) else (float(end[0]), float(end[1]))
-        sides.append(Side(first, last, center, turn, f"arc_{n}" if center else "", n))
+        stop = sides[0].start if _is_first(sides, end, size) else (float(end[0]), float(end[1]))
+        sides.append(Side(first, stop, center, turn, f"arc_{n}" if center else "", n))
         start = end
     if len(sides) < 2:
         raise GeometryError("outline: one side encloses nothing: give two arcs or three sides.")
@@ -191,8 +191,8 @@ def _arc(start: Floats, middle: Floats, end: Floats) -> tuple[Point, float]:
     x = (b[1] * (a @ a) - a[1] * (b @ b)) / area
     y = (a[0] * (b @ b) - b[0] * (a @ a)) / area
     center = (float(start[0] + x), float(start[1] + y))
-    first, last = (atan2(p[1] - center[1], p[0] - center[0]) for p in (start, end))
-    turn = (last - first) % (2 * pi)
+    alpha, beta = (atan2(p[1] - center[1], p[0] - center[0]) for p in (start, end))
+    turn = (beta - alpha) % (2 * pi)
     return center, turn if area > 0 else turn - 2 * pi
 
 
@@ -205,12 +205,12 @@ def polygon_of(sides: Sequence[Side]) -> Floats:
 def split_sides(sides: Sequence[Side], sets: Mapping[str, Any]) -> list[Side]:
     """Sides with corners where boxes of sets end."""
     limits: list[tuple[int, float, Callable[[Floats], Bools]]] = []
-    for name, where in sets.items():
-        if not callable(where) and not _are_numbers(where):
+    for name, choice in sets.items():
+        if not callable(choice) and not _are_numbers(choice):
             what = f"sets[{name!r}]"
             limits += [
-                (axis, value, selector(where, 2, what))
-                for corner in box_of(where, 2, what)
+                (axis, value, selector(choice, 2, what))
+                for corner in box_of(choice, 2, what)
                 for axis, value in enumerate(corner.tolist())
                 if np.isfinite(value)
             ]
@@ -226,16 +226,16 @@ def split_sides(sides: Sequence[Side], sets: Mapping[str, Any]) -> list[Side]:
     return result
 
 
-def _are_numbers(where: Any) -> bool:
+def _are_numbers(choice: Any) -> bool:
     """Whether a choice is a list of numbers of sides."""
-    return isinstance(where, Sequence) and all(
-        isinstance(n, int) and not isinstance(n, bool) for n in where
+    return isinstance(choice, Sequence) and all(
+        isinstance(n, int) and not isinstance(n, bool) for n in choice
     )
 
 
 def distance_to(sides: Sequence[Side], x: Point) -> float:
     """Distance of a point from an outline."""
-    best = inf
+    distance = inf
     for side in sides:
         ends = [hypot(x[0] - p[0], x[1] - p[1]) for p in (side.start, side.end)]
         if side.center is None:
@@ -243,14 +243,14 @@ def distance_to(sides: Sequence[Side], x: Point) -> float:
             direction = (b - a) / hypot(*(b - a))
             t = float(np.clip((np.array(x) - a) @ direction / hypot(*(b - a)), 0, 1))
             foot = a + t * (b - a)
-            best = min(best, hypot(x[0] - foot[0], x[1] - foot[1]))
+            distance = min(distance, hypot(x[0] - foot[0], x[1] - foot[1]))
             continue
         (cx, cy), (sx, sy) = side.center, side.start
         angle = atan2(x[1] - cy, x[0] - cx) - atan2(sy - cy, sx - cx)
         angle = angle % (2 * pi) if side.turn > 0 else -((-angle) % (2 * pi))
         on_arc = abs(hypot(x[0] - cx, x[1] - cy) - side.radius)
-        best = min(best, on_arc if abs(angle) <= abs(side.turn) else min(ends))
-    return best
+        distance = min(distance, on_arc if abs(angle) <= abs(side.turn) else min(ends))
+    return distance
 
 
 def is_inside(sides: Sequence[Side], x: Point) -> bool:

@@ -63,10 +63,10 @@ def part(
         facets = facet_set(mesh, of, "part")
     except ProblemError as error:
         raise MeshError(str(error)) from None
-    chosen = chosen_facets(mesh.points, facets, where, f"part {name!r}")
+    part_facets = chosen_facets(mesh.points, facets, where, f"part {name!r}")
     facet_sets = {n: f for n, f in mesh.facet_sets.items() if n != "boundary"}
     return sound_mesh(
-        mesh.points, mesh.cells, {**facet_sets, name: chosen}, mesh.cell_sets, mesh.curves
+        mesh.points, mesh.cells, {**facet_sets, name: part_facets}, mesh.cell_sets, mesh.curves
     )
 
 
@@ -80,8 +80,8 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
     """
     is_inside = selector(where, points.shape[1], what)
     middle = points[facets].mean(axis=1)
-    chosen = is_inside(middle)
-    if not chosen.any():
+    is_chosen = is_inside(middle)
+    if not is_chosen.any():
         raise MeshError(
             f"{what} has no facets: the middles of the {len(facets)} facets reach from "
             f"{at(middle.min(axis=0))} to {at(middle.max(axis=0))}: choose some of them."
@@ -90,14 +90,14 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
     shares = _shares(points.shape[1])
     samples = [np.einsum("b,kbd->kd", share, points[facets]) for share in shares]
     area = sum(float(size @ is_inside(x)) for x in samples) / len(shares)
-    facet_area = float(size[chosen].sum())
+    facet_area = float(size[is_chosen].sum())
     if abs(facet_area - area) > _ENDS * facet_area:
         warn(
             f"{what} has facets of {facet_area:.4g} in all, where {area:.4g} lie within what was "
             "asked for: its ends lie within facets. Refine the mesh there, or put points of the "
             "mesh at the ends."
         )
-    return facets[chosen]
+    return facets[is_chosen]
 
 
 def selector(where: Where, dim: int, what: str) -> Callable[[Floats], Bools]:

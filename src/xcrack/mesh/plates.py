@@ -317,7 +317,7 @@ def _draw(
         for piece in parts:
             corner(piece.start)
     curves: dict[str, list[int]] = {}
-    outer = []
+    outer_curves = []
     for n, parts in enumerate(pieces):
         tags = []
         for piece in parts:
@@ -327,8 +327,8 @@ def _draw(
                 middle = geo.addPoint(*piece.center, 0.0)
                 tags.append(geo.addCircleArc(corner(piece.start), middle, corner(piece.end)))
         curves[f"side {n}"] = tags
-        outer += tags
-    loops = [geo.addCurveLoop(outer)]
+        outer_curves += tags
+    loops = [geo.addCurveLoop(outer_curves)]
     for name, ((x, y), radius) in zip(names, holes, strict=True):
         middle = geo.addPoint(x, y, 0.0)
         turn = [(radius, 0.0), (0.0, radius), (-radius, 0.0), (0.0, -radius)]
@@ -417,26 +417,26 @@ def _finish(
     first = [name for name in ("left", "right", "bottom", "top") if name in edges_by_name]
     order = dict.fromkeys([*first, *edges_by_name])
     facet_sets = {name: np.concatenate(edges_by_name[name]) for name in order} | facets
-    outer = np.concatenate([*of_sides, *facets.values()])
-    for name, where in sets.items():
-        if callable(where) or not _are_numbers(where):
-            facet_sets[name] = chosen_facets(points, outer, where, f"sets[{name!r}]")
+    boundary = np.concatenate([*of_sides, *facets.values()])
+    for name, choice in sets.items():
+        if callable(choice) or not _are_numbers(choice):
+            facet_sets[name] = chosen_facets(points, boundary, choice, f"sets[{name!r}]")
             continue
-        numbers = whole_numbers(where, f"sets[{name!r}]", (None,), error=MeshError).tolist()
+        numbers = whole_numbers(choice, f"sets[{name!r}]", (None,), error=MeshError).tolist()
         strange_numbers = sorted(set(numbers) - {side.number for side in sides})
         if strange_numbers or not numbers:
-            last = max(side.number for side in sides)
+            n_max = max(side.number for side in sides)
             raise MeshError(
-                f"sets[{name!r}] = {value_text(where)}: the sides have the numbers 0 to {last}: "
+                f"sets[{name!r}] = {value_text(choice)}: the sides have the numbers 0 to {n_max}: "
                 "give some of them."
             )
-        chosen = [edges for side, edges in zip(sides, of_sides) if side.number in numbers]
-        facet_sets[name] = np.concatenate(chosen)
+        edges_of_set = [edges for side, edges in zip(sides, of_sides) if side.number in numbers]
+        facet_sets[name] = np.concatenate(edges_of_set)
     return sound_mesh(points, cells, facet_sets, curves=rims)
 
 
-def _are_numbers(where: Any) -> bool:
-    return isinstance(where, Sequence) and not any(np.ndim(entry) for entry in where)
+def _are_numbers(choice: Any) -> bool:
+    return isinstance(choice, Sequence) and not any(np.ndim(entry) for entry in choice)
 
 
 def _checked_sets(sets: Any, names: Sequence[str]) -> Sets:
@@ -484,8 +484,8 @@ def _check_holes(sides: Sequence[Side], size: float, holes: Sequence[Hole]) -> N
                 f"hole {i} (centre {tuple(center)}, radius {radius:g}) reaches {-gap:g} beyond the "
                 "plate: move it inwards or make it smaller."
             )
-        for j, (other, other_radius) in enumerate(holes[:i]):
-            gap = hypot(center[0] - other[0], center[1] - other[1]) - radius - other_radius
+        for j, (place, other_radius) in enumerate(holes[:i]):
+            gap = hypot(center[0] - place[0], center[1] - place[1]) - radius - other_radius
             if gap <= 0:
                 raise GeometryError(
                     f"holes {j} and {i} overlap by {-gap:g}: move them apart or make them smaller."

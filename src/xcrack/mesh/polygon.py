@@ -21,7 +21,7 @@ def ear_clipped(polygon: Floats) -> Ints:
     rest = list(range(len(polygon)))
     triangles = []
     while len(rest) > 3:
-        best, where = -np.inf, -1
+        best_shape, ear = -np.inf, -1
         remaining_polygon = polygon[rest]
         previous_corner, next_corner = (
             np.roll(remaining_polygon, 1, axis=0),
@@ -39,14 +39,14 @@ def ear_clipped(polygon: Floats) -> Ints:
                 axis=1
             )
             longest_square = max(np.sum((b - a) ** 2), np.sum((c - b) ** 2), np.sum((a - c) ** 2))
-            if not is_within.any() and area[k] / longest_square > best:
-                best, where = float(area[k] / longest_square), int(k)
-        if where < 0:
+            if not is_within.any() and area[k] / longest_square > best_shape:
+                best_shape, ear = float(area[k] / longest_square), int(k)
+        if ear < 0:
             # Only points on one line are left over at this end; they hold no area.
-            where = int(np.argmin(np.abs(area)))
+            ear = int(np.argmin(np.abs(area)))
         n = len(rest)
-        triangles.append((rest[where - 1], rest[where], rest[(where + 1) % n]))
-        del rest[where]
+        triangles.append((rest[ear - 1], rest[ear], rest[(ear + 1) % n]))
+        del rest[ear]
     triangles.append((rest[0], rest[1], rest[2]))
     return np.array(triangles, dtype=np.int64)
 
@@ -61,12 +61,12 @@ def without_slivers(points: Floats, triangles: Ints) -> Ints:
     for _ in range(len(faces) ** 2):
         owner = {(f[k], f[k - 2]): n for n, f in enumerate(faces) for k in range(3)}
         for (p, q), first in owner.items():
-            second = owner.get((q, p))
-            if second is None or p > q:
+            neighbour = owner.get((q, p))
+            if neighbour is None or p > q:
                 continue
-            a, b = sum(faces[first]) - p - q, sum(faces[second]) - p - q
+            a, b = sum(faces[first]) - p - q, sum(faces[neighbour]) - p - q
             if _in_circle(*points[[p, q, a, b]]):
-                faces[first], faces[second] = (a, p, b), (b, q, a)
+                faces[first], faces[neighbour] = (a, p, b), (b, q, a)
                 break
         else:
             break
@@ -77,8 +77,8 @@ def _in_circle(p: Floats, q: Floats, a: Floats, b: Floats) -> bool:
     """Whether b lies inside the circle of p, q, a, beyond pq, and the diagonal ab may be cut."""
     angles = []
     for corner in (a, b):
-        one, other = p - corner, q - corner
-        angles.append(abs(np.arctan2(cross(one, other), one @ other)))
+        to_p, to_q = p - corner, q - corner
+        angles.append(abs(np.arctan2(cross(to_p, to_q), to_p @ to_q)))
     is_convex = cross(b - p, a - p) > 0 and cross(a - q, b - q) > 0
     return bool(is_convex and sum(angles) > np.pi * (1 + 1e-9))
 
@@ -108,8 +108,8 @@ def self_crossing(polygon: Floats) -> tuple[int, int] | None:
     hit |= on & (places_between != 0) & (((j - i) % m) != 1)
     if not hit.any():
         return None
-    first, second = np.argwhere(hit)[0]
-    return int(first), int(second)
+    side, crossed_side = np.argwhere(hit)[0]
+    return int(side), int(crossed_side)
 
 
 def is_within(x: Floats, edges: Floats) -> Bools:

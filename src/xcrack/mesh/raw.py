@@ -154,8 +154,8 @@ def _without_own_boundary(
     if "boundary" not in facet_sets:
         return facet_sets
     facets = facet_sets["boundary"]
-    number, outer = (np.unique(bare_mesh.facet_numbers(f)) for f in (facets, bare_mesh.boundary))
-    if not np.array_equal(number, outer):
+    number, boundary = (np.unique(bare_mesh.facet_numbers(f)) for f in (facets, bare_mesh.boundary))
+    if not np.array_equal(number, boundary):
         del facet_sets["boundary"]
         name = "boundary_of_file"
         while name in facet_sets:
@@ -163,7 +163,7 @@ def _without_own_boundary(
         facet_sets[name] = facets
         warn(
             f'{source}: the set "boundary" has {len(number)} facets, the boundary of the mesh has '
-            f'{len(outer)}: it is called {value_text(name)} here, since "boundary" means all of '
+            f'{len(boundary)}: it is called {value_text(name)} here, since "boundary" means all of '
             f"them."
         )
     return facet_sets

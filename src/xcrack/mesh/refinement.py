@@ -159,11 +159,11 @@ def _row(table: Ints, column: Ints) -> Ints:
 
 def _ranked_edges(points: Floats, edges: Ints) -> tuple[Floats, Ints]:
     """Middles of edges, and what orders them: the same bits however points are numbered."""
-    one, other = points[edges[:, 0]], points[edges[:, 1]]
-    middle = 0.5 * (one + other)
-    step = np.round(np.log2(np.linalg.norm(one - other, axis=1)) * _ALIKE)
+    start, end = points[edges[:, 0]], points[edges[:, 1]]
+    middle = 0.5 * (start + end)
+    step = np.round(np.log2(np.linalg.norm(start - end, axis=1)) * _ALIKE)
     length = np.exp2(step / _ALIKE)[:, None]
-    direction = np.round((one - other) / length * _PLACE)
+    direction = np.round((start - end) / length * _PLACE)
     leading_component = direction[np.arange(len(edges)), np.argmax(direction != 0, axis=1)]
     direction *= np.sign(leading_component)[:, None]
     place = np.round(middle / length * _PLACE)
@@ -201,8 +201,8 @@ def _edges_across(simplex_set: Simplices, rows: Bools, point: Ints) -> Ints:
     )
     longest_edge, cells = simplex_set.longest_edge[rows], simplex_set.cells[rows]
     middle = point[_row(simplex_set.cell_to_edge[rows], longest_edge)]
-    other = np.take_along_axis(cells, other_corners[longest_edge], axis=1)
-    return np.stack([other, np.broadcast_to(middle[:, None], other.shape)], axis=-1)
+    corners = np.take_along_axis(cells, other_corners[longest_edge], axis=1)
+    return np.stack([corners, np.broadcast_to(middle[:, None], corners.shape)], axis=-1)
 
 
 def _halved_cells(
@@ -404,8 +404,8 @@ def graded_sizes(places: Sequence[Floats], sizes: Sequence[Floats]) -> Callable[
             trees.append((cKDTree(x[is_of_step]), float(size[is_of_step].min())))
 
     def wanted_size(x: Floats) -> Floats:
-        each = [h + _SLOPE * np.maximum(tree.query(x)[0] - _PLATEAU * h, 0) for tree, h in trees]
-        return np.asarray(np.min(each, axis=0)) if each else np.full(len(x), np.inf)
+        local_h = [h + _SLOPE * np.maximum(tree.query(x)[0] - _PLATEAU * h, 0) for tree, h in trees]
+        return np.asarray(np.min(local_h, axis=0)) if local_h else np.full(len(x), np.inf)
 
     return wanted_size
 
@@ -529,12 +529,12 @@ def _sweep(
             name: _parts(fine_set, mesh.facet_numbers(mesh.facet_sets[name]))
             for name in mesh.curves
         }
-        outer = _parts(fine_set, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
+        boundary = _parts(fine_set, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0])
         is_new = np.arange(len(fine_set.points)) >= first
         is_new[flat_points] = True
         size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in mesh.curves))
         points, is_changed, flat_points = on_curves(
-            fine_set.points, fine_set.cells, is_new, sets, outer, mesh.curves, size
+            fine_set.points, fine_set.cells, is_new, sets, boundary, mesh.curves, size
         )
         if is_changed.any():
             fine_set = moved_simplices(fine_set, points)
@@ -580,11 +580,11 @@ def _split_all_edges(mesh: Mesh) -> Mesh:
     facets = {name: _facet_parts(mesh, facets) for name, facets in mesh.facet_sets.items()}
     curved_facets = {name: facets[name] for name in mesh.curves}
     if curved_facets:
-        outer = facets["boundary"]
+        boundary = facets["boundary"]
         is_new = np.arange(len(points)) >= mesh.n_points
         size = longest_edge(mesh.points, (mesh.facet_sets[name] for name in curved_facets))
         points, _, flat_points = on_curves(
-            points, cells, is_new, curved_facets, outer, mesh.curves, size
+            points, cells, is_new, curved_facets, boundary, mesh.curves, size
         )
         warn_of_flat_points(points, flat_points)
     members = {name: inverse[members].ravel() for name, members in mesh.cell_sets.items()}
@@ -603,13 +603,13 @@ def _tetrahedra(points: Floats, nodes: Ints) -> tuple[Ints, Ints]:
     # Of diagonals that are equal but for round-off the first is taken, wherever the body lies.
     kind = np.argmax(length <= length.min(axis=1, keepdims=True) * (1 + _TIE), axis=1)
     ring = _AROUND[kind]
-    inner = [
+    inner_cells = [
         np.stack([*_DIAGONALS[kind].T, ring[:, i], ring[:, (i + 1) % 4]], axis=1) for i in range(4)
     ]
-    local = np.concatenate(
-        [np.broadcast_to(_CORNERS, (len(nodes), 4, 4)), np.stack(inner, axis=1)], axis=1
+    local_corners = np.concatenate(
+        [np.broadcast_to(_CORNERS, (len(nodes), 4, 4)), np.stack(inner_cells, axis=1)], axis=1
     )
-    children = np.take_along_axis(nodes[:, None], local, axis=2)
+    children = np.take_along_axis(nodes[:, None], local_corners, axis=2)
     return children.reshape(-1, 4), np.repeat(np.arange(len(nodes)), 8)
 
 

@@ -208,10 +208,10 @@ def outward_areas(mesh: Mesh, facets: Ints, what: str) -> Floats:
     """
     number = mesh.facet_numbers(facets)
     cell = mesh.facet_to_cell[number, 0]
-    inner = mesh.facet_to_cell[number, 1] >= 0
-    if inner.any():
+    is_inner = mesh.facet_to_cell[number, 1] >= 0
+    if is_inner.any():
         raise ProblemError(
-            f"{what}: {int(inner.sum())} of its facets lie inside the body; loads act on the "
+            f"{what}: {int(is_inner.sum())} of its facets lie inside the body; loads act on the "
             "boundary only."
         )
     place = np.argmax(mesh.cell_to_facet[cell] == number[:, None], axis=1)
@@ -276,6 +276,6 @@ def _arrays(phi: Floats, x: Floats | None) -> tuple[Floats, Floats]:
 
 def boxes_meet(a: Floats, b: Floats, c: Floats, d: Floats, reach: float = 0.0) -> Bools:
     """Whether the boxes along the axes around segments ab and cd `(..., d)` come within a reach."""
-    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
-    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
-    return np.asarray((low <= high + reach).all(axis=-1))
+    overlap_min = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    overlap_max = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return np.asarray((overlap_min <= overlap_max + reach).all(axis=-1))

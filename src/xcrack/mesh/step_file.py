@@ -282,15 +282,15 @@ def _with_shapes(
     lines : dict of int to (k, 2) array of int
         In 3D: edges of facets on each curved edge of the shape.
     """
-    outer = {
+    outer_faces = {
         tag: face[mesh.facet_to_cell[mesh.facet_numbers(face), 1] < 0]
         for tag, face in faces.items()
     }
-    outer = {tag: face for tag, face in outer.items() if len(face)}
-    if not outer:
+    outer_faces = {tag: face for tag, face in outer_faces.items() if len(face)}
+    if not outer_faces:
         return mesh
-    facets = np.concatenate(list(outer.values()))
-    tag = np.repeat(list(outer), [len(face) for face in outer.values()])
+    facets = np.concatenate(list(outer_faces.values()))
+    tag = np.repeat(list(outer_faces), [len(face) for face in outer_faces.values()])
     grid = lattice(mesh.points, facets)
     # Nodes of edges of the shape belong to these, all others to the face on which they lie.
     owner, of_line = np.zeros((2, len(grid.points)), dtype=np.int64)
@@ -306,8 +306,8 @@ def _with_shapes(
             rows = np.nonzero(numbers == number)[0]
             x = np.zeros((len(rows), 3))
             x[:, : mesh.dim] = grid.points[rows]
-            nearest = gmsh.model.getClosestPoint(dim, number, x.ravel())[0]
-            points[rows] = np.reshape(nearest, (-1, 3))[:, : mesh.dim]
+            feet = gmsh.model.getClosestPoint(dim, number, x.ravel())[0]
+            points[rows] = np.reshape(feet, (-1, 3))[:, : mesh.dim]
     return with_curves(mesh, facets, replace(grid, points=points))
 
 
@@ -345,5 +345,5 @@ def _selected_facets(
             f"sets[{name!r}] returned shape {is_inside.shape} of {is_inside.dtype} for {len(x)} "
             "points: return one bool for each."
         )
-    chosen: Bools = is_inside
-    return bool(chosen.all())
+    mask: Bools = is_inside
+    return bool(mask.all())

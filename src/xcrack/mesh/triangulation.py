@@ -91,8 +91,8 @@ def _parted_at_points(faces: Ints) -> tuple[Ints, Ints]:
         for _ in range(len(faces_around)):
             np.minimum.at(lowest_part := np.arange(part.max() + 1), part, part.min(axis=1)[:, None])
             part = lowest_part[part]
-        for other in np.unique(part[:, 0])[1:]:
-            is_of_part = part[:, 0] == other
+        for part_number in np.unique(part[:, 0])[1:]:
+            is_of_part = part[:, 0] == part_number
             parted_faces[faces_around[is_of_part], corner[is_of_part]] = len(original_numbers)
             original_numbers.append(point)
     return parted_faces, np.array(original_numbers, dtype=np.int64)
@@ -138,16 +138,16 @@ def ruled_strip(
     grid[long_lines, 1:] = n_points + np.arange(len(long_lines) * layers).reshape(-1, layers)
     points = origin[long_lines, None] + share[:, None] * offset[long_lines, None]
     first = grid if is_closed else grid[:-1]
-    second = np.roll(grid, -1, axis=0) if is_closed else grid[1:]
-    corners = [first[:, :-1], second[:, :-1], second[:, 1:], first[:, 1:]]
-    a, b, c, d = (each.ravel() for each in corners)
+    next_line = np.roll(grid, -1, axis=0) if is_closed else grid[1:]
+    corners = [first[:, :-1], next_line[:, :-1], next_line[:, 1:], first[:, 1:]]
+    a, b, c, d = (corner.ravel() for corner in corners)
     points, middles = points.reshape(-1, 3), np.zeros((0, 3), dtype=np.int64)
     if is_crossed:
         x = np.zeros((n_points + len(points), 3))
         x[base], x[n_points:] = origin, points
         is_quad = (a != b) & (c != d) & ~_is_flat(x[a], x[b], x[c], x[d])
         quads = np.stack([a, b, c, d], axis=1)[is_quad]
-        a, b, c, d = (each[~is_quad] for each in (a, b, c, d))
+        a, b, c, d = (corner[~is_quad] for corner in (a, b, c, d))
         middle = n_points + len(points) + np.arange(len(quads))
         sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2)
         middles = np.concatenate(
@@ -219,8 +219,8 @@ def components(faces: Ints) -> Ints:
     face = np.repeat(np.arange(len(faces)), 3)
     order = np.argsort(edges, kind="stable")
     same_edge = edges[order][1:] == edges[order][:-1]
-    one, other = face[order][:-1][same_edge], face[order][1:][same_edge]
-    graph = coo_array((np.ones(len(one)), (one, other)), shape=(len(faces),) * 2)
+    a, b = face[order][:-1][same_edge], face[order][1:][same_edge]
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(faces),) * 2)
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
@@ -232,10 +232,10 @@ def oriented_faces(faces: Ints) -> Ints | None:
     is_forward = pairs[:, 0] < pairs[:, 1]
     order = np.argsort(edges, kind="stable")
     same_edge = edges[order][1:] == edges[order][:-1]
-    one, other = order[:-1][same_edge], order[1:][same_edge]
-    differ = is_forward[one] == is_forward[other]
+    a, b = order[:-1][same_edge], order[1:][same_edge]
+    differ = is_forward[a] == is_forward[b]
     neighbours: list[list[tuple[int, bool]]] = [[] for _ in faces]
-    for i, j, turn in zip(one // 3, other // 3, differ, strict=True):
+    for i, j, turn in zip(a // 3, b // 3, differ, strict=True):
         neighbours[i].append((int(j), bool(turn)))
         neighbours[j].append((int(i), bool(turn)))
     sense = np.full(len(faces), -1)

@@ -312,7 +312,7 @@ class bearing(Load):  # noqa: N801
                 f"{self.name}: {axial_force:.4g} of the force {size:.4g} acts along the axis of "
                 "the hole, where a pin does not press: give that part by traction or resultant."
             )
-        in_section = hole.local(x)
+        in_section = hole.section_places(x)
         direction = in_section / np.linalg.norm(in_section, axis=1)[:, None]
         load_direction = force / np.linalg.norm(force)
         cross_direction = np.array([-load_direction[1], load_direction[0]])

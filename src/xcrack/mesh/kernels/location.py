@@ -10,30 +10,30 @@ _MARGIN = 1e-8  # share of a cell's extent: its box holds what lies in it but fo
 
 
 @kernel
-def _box_meets_bin(points, cells, e, x, low, high):  # type: ignore[no-untyped-def]
-    """Whether the box of a cell, set in `low` and `high`, meets that of points; a margin wider."""
+def _box_meets_bin(points, cells, e, x, box_min, box_max):  # type: ignore[no-untyped-def]
+    """Whether a cell's box, put in `box_min`, `box_max`, meets that of points; a margin wider."""
     for j in range(points.shape[1]):
-        low[j] = high[j] = points[cells[e, 0], j]
+        box_min[j] = box_max[j] = points[cells[e, 0], j]
         for b in range(1, cells.shape[1]):
             value = points[cells[e, b], j]
-            if value < low[j]:
-                low[j] = value
-            elif value > high[j]:
-                high[j] = value
-        margin = _MARGIN * (high[j] - low[j])
-        low[j] -= margin
-        high[j] += margin
-        if low[j] > x[1, j] or high[j] < x[0, j]:
+            if value < box_min[j]:
+                box_min[j] = value
+            elif value > box_max[j]:
+                box_max[j] = value
+        margin = _MARGIN * (box_max[j] - box_min[j])
+        box_min[j] -= margin
+        box_max[j] += margin
+        if box_min[j] > x[1, j] or box_max[j] < x[0, j]:
             return False
     return True
 
 
 @kernel
-def _span(low, high, origin, width, shape, begin, end):  # type: ignore[no-untyped-def]
+def _span(box_min, box_max, origin, width, shape, begin, end):  # type: ignore[no-untyped-def]
     """Set the range of bins that a box meets; their number."""
     count = 1
     for j in range(len(shape)):
-        for bound, place in ((low, begin), (high, end)):
+        for bound, place in ((box_min, begin), (box_max, end)):
             at = (bound[j] - origin[j]) / width[j]
             place[j] = 0
             if at >= shape[j] - 1:
@@ -56,14 +56,14 @@ def _bin(k, begin, end, shape):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cells_in_bins(points, cells, every, shape):  # type: ignore[no-untyped-def]
+def cells_in_bins(points, cells, body_box, shape):  # type: ignore[no-untyped-def]
     """Cells in the bins of a regular grid over the box of a mesh.
 
     Parameters
     ----------
     points : (n, d) array
     cells : (m, d + 1) array of int
-    every : (2, d) array
+    body_box : (2, d) array
         Corners of the box around all points.
     shape : (d,) array of int
         Bins in each direction.
@@ -77,10 +77,10 @@ def cells_in_bins(points, cells, every, shape):  # type: ignore[no-untyped-def]
         Cells whose boxes meet a bin, growing.
     """
     d = points.shape[1]
-    origin, width = every[0], np.empty(d)
+    origin, width = body_box[0], np.empty(d)
     for j in range(d):
-        width[j] = (every[1, j] - every[0, j]) / shape[j]
-    low, high = np.empty(d), np.empty(d)
+        width[j] = (body_box[1, j] - body_box[0, j]) / shape[j]
+    box_min, box_max = np.empty(d), np.empty(d)
     begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
     bins = 1
     for j in range(d):
@@ -98,8 +98,8 @@ def cells_in_bins(points, cells, every, shape):  # type: ignore[no-untyped-def]
             for k in range(bins, 0, -1):
                 start[k] = start[k - 1]
         for e in range(len(cells)):
-            _box_meets_bin(points, cells, e, every, low, high)
-            for k in range(_span(low, high, origin, width, shape, begin, end)):
+            _box_meets_bin(points, cells, e, body_box, box_min, box_max)
+            for k in range(_span(box_min, box_max, origin, width, shape, begin, end)):
                 number = _bin(k, begin, end, shape)
                 if filling == 0:
                     start[number] += 1
@@ -138,7 +138,7 @@ def locate_points(  # type: ignore[no-untyped-def]
     coordinates = np.empty(d + 1)
     begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
     for q in range(len(x)):
-        best, cell[q] = np.inf, -1
+        least_square, cell[q] = np.inf, -1
         _span(x[q], x[q], grid[0], grid[1], shape, begin, end)
         number = _bin(0, begin, end, shape)
         for k in range(grid[2][number], grid[2][number + 1]):
@@ -151,8 +151,8 @@ def locate_points(  # type: ignore[no-untyped-def]
                 for b in range(d + 1):
                     mean += points[cells[e, b], j]
                 square += (mean / (d + 1) - x[q, j]) ** 2
-            if square < best:
-                best, cell[q] = square, e
+            if square < least_square:
+                least_square, cell[q] = square, e
                 for i in range(d + 1):
                     bary[q, i] = coordinates[i]
     return cell, bary
@@ -193,30 +193,30 @@ def _from_segment(points, a, b, x):  # type: ignore[no-untyped-def]
 @kernel
 def cells_within(points, cells, x, radius):  # type: ignore[no-untyped-def]
     """Triangles one of whose sides comes nearer to a point than a radius `(k,)`, growing."""
-    low, high, box = np.empty(2), np.empty(2), np.empty((2, 2))
+    box_min, box_max, box = np.empty(2), np.empty(2), np.empty((2, 2))
     for j in range(2):
         box[0, j], box[1, j] = x[j] - radius, x[j] + radius
-    chosen, count = np.empty(len(cells), np.int64), 0
+    members, count = np.empty(len(cells), np.int64), 0
     for e in range(len(cells)):
-        if _box_meets_bin(points, cells, e, box, low, high):
+        if _box_meets_bin(points, cells, e, box, box_min, box_max):
             for i in range(3):
                 if _from_segment(points, cells[e, i], cells[e, (i + 1) % 3], x) <= radius:
-                    chosen[count] = e
+                    members[count] = e
                     count += 1
                     break
-    return chosen[:count].copy()
+    return members[:count].copy()
 
 
 @kernel
 def nearest_segment(points, segments, x):  # type: ignore[no-untyped-def]
     """Distance of a point in 2D to the nearest of segments `(k, 2)`, and the length of that one."""
-    best, nearest = np.inf, 0
+    least_distance, number = np.inf, 0
     for k in range(len(segments)):
         distance = _from_segment(points, segments[k, 0], segments[k, 1], x)
-        if distance < best:
-            best, nearest = distance, k
-    a, b = segments[nearest, 0], segments[nearest, 1]
-    return best, math.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1])
+        if distance < least_distance:
+            least_distance, number = distance, k
+    a, b = segments[number, 0], segments[number, 1]
+    return least_distance, math.hypot(points[b, 0] - points[a, 0], points[b, 1] - points[a, 1])
 
 
 @kernel
@@ -235,23 +235,23 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
     phi : (n,) array
     segment : (n,) array of int
     """
-    n, last = len(x), len(vertices) - 2
+    n, last_segment = len(x), len(vertices) - 2
     phi = np.empty(n)
     segment = np.empty(n, np.int64)
-    length = np.empty(last + 1)
-    ex = np.empty(last + 1)
-    ey = np.empty(last + 1)
-    for s in range(last + 1):
+    length = np.empty(last_segment + 1)
+    ex = np.empty(last_segment + 1)
+    ey = np.empty(last_segment + 1)
+    for s in range(last_segment + 1):
         dx = vertices[s + 1, 0] - vertices[s, 0]
         dy = vertices[s + 1, 1] - vertices[s, 1]
         length[s] = np.sqrt(dx * dx + dy * dy)
         ex[s] = dx / length[s]
         ey[s] = dy / length[s]
     for i in range(n):
-        best = np.inf
-        where = 0
+        least_square = np.inf
+        foot_segment = 0
         at = 0.0
-        for s in range(last + 1):
+        for s in range(last_segment + 1):
             gx = x[i, 0] - vertices[s, 0]
             gy = x[i, 1] - vertices[s, 1]
             foot = gx * ex[s] + gy * ey[s]
@@ -262,11 +262,11 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
             rx = gx - foot * ex[s]
             ry = gy - foot * ey[s]
             square = rx * rx + ry * ry
-            if square < best:
-                best = square
-                where = s
+            if square < least_square:
+                least_square = square
+                foot_segment = s
                 at = foot
-        s = where
+        s = foot_segment
         gx = x[i, 0] - vertices[s, 0]
         gy = x[i, 1] - vertices[s, 1]
         normal_part = ey[s] * -gx + ex[s] * gy
@@ -274,15 +274,15 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
         if 0.0 < at < length[s]:
             phi[i] = normal_part
             continue
-        other = s
+        neighbour = s
         if at == 0.0 and s > 0:
-            other = s - 1
-        elif at >= length[s] and s < last:
-            other = s + 1
+            neighbour = s - 1
+        elif at >= length[s] and s < last_segment:
+            neighbour = s + 1
         rx = gx - at * ex[s]
         ry = gy - at * ey[s]
-        sign = (-ey[s] - ey[other]) * rx + (ex[s] + ex[other]) * ry
-        phi[i] = np.copysign(np.sqrt(best), sign)
+        sign = (-ey[s] - ey[neighbour]) * rx + (ex[s] + ex[neighbour]) * ry
+        phi[i] = np.copysign(np.sqrt(least_square), sign)
     return phi, segment
 
 
@@ -310,23 +310,23 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    nearest : (n,) array of int
+    vertex : (n,) array of int
         -1 where there is none.
     distance : (n,) array
         inf where there is none.
     """
     n, count = len(x), len(vertices)
-    each = max(1, int(0.8 * math.sqrt(count)))
-    stretches = (count + each - 1) // each
+    stretch_size = max(1, int(0.8 * math.sqrt(count)))
+    stretches = (count + stretch_size - 1) // stretch_size
     middle, reach = np.empty((stretches, 3)), np.zeros(stretches)
     for b in range(stretches):
-        first, end = b * each, min(count, (b + 1) * each)
+        first, end = b * stretch_size, min(count, (b + 1) * stretch_size)
         for j in range(3):
             middle[b, j] = vertices[(first + end) // 2, j]
         for v in range(first, end):
             square = _square_distance(middle[b, 0], middle[b, 1], middle[b, 2], vertices, v)
             reach[b] = max(reach[b], math.sqrt(square) * (1.0 + 1e-12))
-    nearest, distance = np.full(n, -1, np.int64), np.full(n, np.inf)
+    vertex, distance = np.full(n, -1, np.int64), np.full(n, np.inf)
     start = 0
     for i in range(n):
         p, q, r = x[i, 0], x[i, 1], x[i, 2]
@@ -339,13 +339,13 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
             if square >= (least_distance + reach[b]) ** 2:
                 continue
             is_closer = False
-            for v in range(b * each, min(count, (b + 1) * each)):
+            for v in range(b * stretch_size, min(count, (b + 1) * stretch_size)):
                 square = _square_distance(p, q, r, vertices, v)
                 if square < least_square:
                     least_square, nearest_number, is_closer = square, v, True
             if is_closer:
                 least_distance = math.sqrt(least_square)
         if nearest_number >= 0:
-            nearest[i], distance[i] = nearest_number, least_distance
-            start = nearest_number // each
-    return nearest, distance
+            vertex[i], distance[i] = nearest_number, least_distance
+            start = nearest_number // stretch_size
+    return vertex, distance

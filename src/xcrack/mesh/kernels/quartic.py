@@ -55,34 +55,34 @@ def _place(table, nodes, bary, x, tangents, value, slope):  # type: ignore[no-un
 
 
 @kernel
-def _along_edge(table, nodes, target, bary, first, second, work):  # type: ignore[no-untyped-def]
+def _along_edge(table, nodes, target, bary, begin, end, work):  # type: ignore[no-untyped-def]
     """Move `bary` to the nearest point of an edge of a piece; the squared distance to it."""
     x, tangents, value, slope = work
-    t = bary[second] / max(bary[first] + bary[second], 1e-300)
+    t = bary[end] / max(bary[begin] + bary[end], 1e-300)
     t = min(max(t, 0.0), 1.0)
     if not t >= 0.0:
         t = 0.5
     d = len(x)
-    best, square = t, np.inf
+    best_t, square = t, np.inf
     for _ in range(_STEPS):
         bary[:] = 0.0
-        bary[first], bary[second] = 1.0 - t, t
+        bary[begin], bary[end] = 1.0 - t, t
         _place(table, nodes, bary, x, tangents, value, slope)
         up, curvature, distance = 0.0, 0.0, 0.0
         for i in range(d):
-            tangent = tangents[second, i] - tangents[first, i]
+            tangent = tangents[end, i] - tangents[begin, i]
             up += tangent * (target[i] - x[i])
             curvature += tangent * tangent
             distance += (target[i] - x[i]) ** 2
         if distance < square:
-            best, square = t, distance
+            best_t, square = t, distance
         step = min(max(up / max(curvature, 1e-300), -_WIDEST), _WIDEST)
         position = min(max(t + step, 0.0), 1.0)
         if abs(position - t) <= _AT_REST:
             break
         t = position
     bary[:] = 0.0
-    bary[first], bary[second] = 1.0 - best, best
+    bary[begin], bary[end] = 1.0 - best_t, best_t
     _place(table, nodes, bary, x, tangents, value, slope)
     return square
 
@@ -136,7 +136,7 @@ def _may_be_nearer(x, centre, radius, square):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radius):  # type: ignore[no-untyped-def]
+def nearest_on_pieces(x, candidates, offsets, piece, node_number, nodes, centre, radius):  # type: ignore[no-untyped-def]
     """Nearest points of quartic pieces.
 
     Parameters
@@ -145,7 +145,7 @@ def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radiu
     candidates : (q, k) array of int
         Nodes from whose pieces the search begins.
     offsets : (n + 1,) array of int
-    piece, local : (.,) arrays of int
+    piece, node_number : (.,) arrays of int
         Pieces that have each node, and its number in them.
     nodes : (p, 5, d) or (p, 15, 3) array
         Nodes of the pieces of a curve or of a surface.
@@ -170,13 +170,13 @@ def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radiu
             for row in range(offsets[n], offsets[n + 1]):
                 f = piece[row]
                 is_new = count < _MOST_PIECES
-                for other in tried_pieces[:count]:
-                    is_new = is_new and other != f
+                for g in tried_pieces[:count]:
+                    is_new = is_new and g != f
                 if not is_new:
                     continue
                 tried_pieces[count] = f
                 for j in range(corners):
-                    bary[j] = start[count, j] = table[local[row], j] / 4.0
+                    bary[j] = start[count, j] = table[node_number[row], j] / 4.0
                 count += 1
                 if corners == 3 and _may_be_nearer(x[q], centre[f], radius[f], least_square):
                     square = _move_inside(table, nodes[f], x[q], bary, work)
@@ -189,18 +189,18 @@ def nearest_on_pieces(x, candidates, offsets, piece, local, nodes, centre, radiu
             if not _may_be_nearer(x[q], centre[f], radius[f], least_square):
                 continue
             edge = corners + 1  # the node at the middle of the first edge; of the next, three on
-            for first in range(corners - 1):
-                for second in range(first + 1, corners):
+            for begin in range(corners - 1):
+                for end in range(begin + 1, corners):
                     middle = nodes[f, edge]
                     half = 0.0
                     for i in range(d):
-                        one, other = nodes[f, first, i] - middle[i], nodes[f, second, i] - middle[i]
-                        half = max(half, abs(one), abs(other))
+                        a, b = nodes[f, begin, i] - middle[i], nodes[f, end, i] - middle[i]
+                        half = max(half, abs(a), abs(b))
                     edge += 3
                     if not _may_be_nearer(x[q], middle, _ROOMY * math.sqrt(d) * half, least_square):
                         continue
                     bary[:] = start[c]
-                    square = _along_edge(table, nodes[f], x[q], bary, first, second, work)
+                    square = _along_edge(table, nodes[f], x[q], bary, begin, end, work)
                     if square < least_square:
                         least_square, owner[q] = square, f
                         foot[q] = work[0]

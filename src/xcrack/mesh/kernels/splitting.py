@@ -13,11 +13,11 @@ _SECTOR = 0.6  # rad, widest sector of a fan
 
 
 @kernel
-def _set_vertices(bary, to, point, chosen):  # type: ignore[no-untyped-def]
+def _set_vertices(bary, to, point, numbers):  # type: ignore[no-untyped-def]
     """Set the vertices of a part to chosen points."""
     for v in range(bary.shape[1]):
         for b in range(bary.shape[2]):
-            bary[to, v, b] = point[chosen[v], b]
+            bary[to, v, b] = point[numbers[v], b]
 
 
 @kernel
@@ -62,10 +62,10 @@ def _sides(phi, e, order):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _distance_sum(x, e, i, order, first, last):  # type: ignore[no-untyped-def]
+def _distance_sum(x, e, i, order, first, end):  # type: ignore[no-untyped-def]
     """Sum of the distances of vertex i to some vertices."""
     total = 0.0
-    for m in range(first, last):
+    for m in range(first, end):
         square = 0.0
         for a in range(x.shape[2]):
             square += (x[e, i, a] - x[e, order[m], a]) ** 2
@@ -82,26 +82,26 @@ def _sort(phi, x, e, order, count):  # type: ignore[no-untyped-def]
     split alike.
     """
     n = len(order)
-    for first, last in ((0, count), (count, n)):
-        begin, end = count - first, count + n - last  # of the other side
-        for i in range(first + 1, last):  # stable insertion
-            one, j = order[i], i
+    for first, stop in ((0, count), (count, n)):
+        begin, end = count - first, count + n - stop  # of the other side
+        for i in range(first + 1, stop):  # stable insertion
+            vertex, j = order[i], i
             while j > first:
-                other = order[j - 1]
-                distance, other_distance = abs(phi[e, one]), abs(phi[e, other])
+                neighbour = order[j - 1]
+                distance, other_distance = abs(phi[e, vertex]), abs(phi[e, neighbour])
                 if abs(distance - other_distance) > _SAME * max(distance, other_distance):
                     if distance > other_distance:
                         break
                 elif x.shape[0] == 0:
                     break
                 else:
-                    distance_sum = _distance_sum(x, e, one, order, begin, end)
-                    other_sum = _distance_sum(x, e, other, order, begin, end)
+                    distance_sum = _distance_sum(x, e, vertex, order, begin, end)
+                    other_sum = _distance_sum(x, e, neighbour, order, begin, end)
                     if distance_sum > (1.0 - _SAME) * other_sum:
                         break
-                order[j] = other
+                order[j] = neighbour
                 j -= 1
-            order[j] = one
+            order[j] = vertex
 
 
 @kernel
@@ -127,7 +127,7 @@ def cut_simplices(phi, x, least_volume):  # type: ignore[no-untyped-def]
     capacity = n * k if n == 3 else 6 * k
     bary, fraction = np.empty((capacity, n, n)), np.empty(capacity)
     side, parent = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-    order, chosen = np.empty(n, np.int64), np.empty(n, np.int64)
+    order, vertices = np.empty(n, np.int64), np.empty(n, np.int64)
     t, u, point = np.empty(n), np.empty(n), _corners(n)
     to = 0
     for e in range(k):
@@ -136,23 +136,23 @@ def cut_simplices(phi, x, least_volume):  # type: ignore[no-untyped-def]
             continue
         _sort(phi, x, e, order, count)
         if count == 1 or count == n - 1:
-            side_sign, other = (1, 1) if count == 1 else (-1, 0)
-            apex = order[(n - 1) * (1 - other)]
+            side_sign, base = (1, 1) if count == 1 else (-1, 0)
+            apex = order[(n - 1) * (1 - base)]
             total = 1.0
-            chosen[0] = apex
+            vertices[0] = apex
             for m in range(n - 1):
-                t[m], u[m] = _mix(point, 4 + m, phi, e, apex, order[other + m])
+                t[m], u[m] = _mix(point, 4 + m, phi, e, apex, order[base + m])
                 total *= t[m]
-                chosen[1 + m] = 4 + m
-            _set_vertices(bary, to, point, chosen)
+                vertices[1 + m] = 4 + m
+            _set_vertices(bary, to, point, vertices)
             fraction[to], side[to], parent[to] = total, side_sign, e
             to += total > least_volume
             share = 1.0
             for i in range(n - 1):
-                chosen[1 + i] = order[other + i]
+                vertices[1 + i] = order[base + i]
             for m in range(n - 1):
-                chosen[m] = 4 + m
-                _set_vertices(bary, to, point, chosen)
+                vertices[m] = 4 + m
+                _set_vertices(bary, to, point, vertices)
                 fraction[to], side[to], parent[to] = share * u[m], -side_sign, e
                 to += fraction[to] > least_volume
                 share *= t[m]
@@ -169,15 +169,15 @@ def cut_simplices(phi, x, least_volume):  # type: ignore[no-untyped-def]
             t_bc, t_cb = _mix(point, 6, phi, e, b, c)
             t_bd, t_db = _mix(point, 7, phi, e, b, d)
             for piece in range(3):
-                chosen[0], chosen[1], chosen[2], chosen[3] = a, 4, 6, 7
+                vertices[0], vertices[1], vertices[2], vertices[3] = a, 4, 6, 7
                 fraction[to] = t_ac * t_cb * t_bd
                 if piece == 0:
-                    chosen[2] = 5
+                    vertices[2] = 5
                     fraction[to] = t_ac * t_ad * t_db
                 elif piece == 2:
-                    chosen[1] = b
+                    vertices[1] = b
                     fraction[to] = t_bc * t_bd
-                _set_vertices(bary, to, point, chosen)
+                _set_vertices(bary, to, point, vertices)
                 side[to], parent[to] = side_sign, e
                 to += fraction[to] > least_volume
     return bary[:to], fraction[:to], side[:to], parent[:to]
@@ -213,16 +213,16 @@ def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
     """
     k, n = phi.shape
     bary, parent = np.empty((2 * k + 1, n - 1, n)), np.empty(2 * k + 1, np.int64)
-    order, chosen = np.empty(n, np.int64), np.empty(n, np.int64)
+    order, vertices = np.empty(n, np.int64), np.empty(n, np.int64)
     point, to = _corners(n), 0
     for e in range(k):
         count = _sides(phi, e, order)
         if count == 1 or count == n - 1:
-            apex, other = (order[0], 1) if count == 1 else (order[n - 1], 0)
+            apex, base = (order[0], 1) if count == 1 else (order[n - 1], 0)
             for m in range(n - 1):
-                _mix(point, 4 + m, phi, e, apex, order[other + m])
-                chosen[m] = 4 + m
-            _set_vertices(bary, to, point, chosen)
+                _mix(point, 4 + m, phi, e, apex, order[base + m])
+                vertices[m] = 4 + m
+            _set_vertices(bary, to, point, vertices)
             parent[to] = e
             to += not _is_degenerate(bary, to)
         elif 0 < count < n:
@@ -230,8 +230,8 @@ def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
             for m in range(4):
                 _mix(point, 4 + m, phi, e, order[m // 2], order[2 + (m == 1 or m == 2)])
             for half in range(2):
-                chosen[0], chosen[1], chosen[2] = 4, 5 + half, 6 + half
-                _set_vertices(bary, to, point, chosen)
+                vertices[0], vertices[1], vertices[2] = 4, 5 + half, 6 + half
+                _set_vertices(bary, to, point, vertices)
                 parent[to] = e
                 to += not _is_degenerate(bary, to)
     return bary[:to], parent[:to]
@@ -279,11 +279,11 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
             square = x * x + y * y
             foot = (a * x + b * y) / square if square > 1e-300 else 0.0
             # A part as long as the round-off of coordinates would have points on the tip itself.
-            largest = max(
+            scale = max(
                 abs(begin[s, 0]), abs(begin[s, 1]), abs(end[s, 0]), abs(end[s, 1]),
                 abs(tips[nearest_tip, 0]), abs(tips[nearest_tip, 1]),
             )  # fmt: skip
-            close_share = max(_FOOT, min(0.5, _ROUND_OFF * largest / max(length, 1e-300)))
+            close_share = max(_FOOT, min(0.5, _ROUND_OFF * scale / max(length, 1e-300)))
             if abs(foot) < close_share:
                 foot = 0.0
             elif abs(foot - 1) < close_share:
@@ -295,15 +295,15 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
         for part in range(2):
             sign = 1.0 if part == 1 else -1.0
             # From the foot to the near end of this part and to the far one, in this direction.
-            first, last = sign * (1 - part - foot), sign * (part - foot)
-            if (is_near and last <= 0) or (not is_near and part == 1):
+            first, stop = sign * (1 - part - foot), sign * (part - foot)
+            if (is_near and stop <= 0) or (not is_near and part == 1):
                 continue
-            low, high = math.sqrt(max(first, 0.0)), math.sqrt(max(last, 0.0))
+            u_min, u_max = math.sqrt(max(first, 0.0)), math.sqrt(max(stop, 0.0))
             for i in range(n):
                 p, share = u[i], w[i]
                 if is_near:
-                    v = low + (high - low) * u[i]
-                    p, share = foot + sign * (v * v), (high - low) * (2 * v * w[i])
+                    v = u_min + (u_max - u_min) * u[i]
+                    p, share = foot + sign * (v * v), (u_max - u_min) * (2 * v * w[i])
                 number[to], weight[to] = s, length * share
                 place[to, 0], place[to, 1] = 1 - p, p
                 to += 1
@@ -382,18 +382,18 @@ def split_segments(ends, cut, level):  # type: ignore[no-untyped-def]
 @kernel
 def _distance(x, y, corner):  # type: ignore[no-untyped-def]
     """Distance of a point to a triangle (3, 2), 0 inside."""
-    best = np.inf
-    low, high = np.inf, -np.inf
+    least_distance = np.inf
+    turn_min, turn_max = np.inf, -np.inf
     for i in range(3):
         j = (i + 1) % 3
         ax, ay = corner[j, 0] - corner[i, 0], corner[j, 1] - corner[i, 1]
         bx, by = x - corner[i, 0], y - corner[i, 1]
         square = max(ax * ax + ay * ay, 1e-300)
         t = min(max((bx * ax + by * ay) / square, 0.0), 1.0)
-        best = min(best, math.hypot(bx - t * ax, by - t * ay))
+        least_distance = min(least_distance, math.hypot(bx - t * ax, by - t * ay))
         turn = ax * by - ay * bx
-        low, high = min(low, turn), max(high, turn)
-    return 0.0 if low >= 0.0 or high <= 0.0 else best
+        turn_min, turn_max = min(turn_min, turn), max(turn_max, turn)
+    return 0.0 if turn_min >= 0.0 or turn_max <= 0.0 else least_distance
 
 
 @kernel
@@ -483,8 +483,8 @@ def _put_fan(  # type: ignore[no-untyped-def]
         end = 0.0
         for k in range(sectors):
             begin, part = end, (k + 1) / sectors
-            first, last = a * math.sin(part * angle), b * math.sin((1 - part) * angle)
-            end = first / (first + last) if first + last > 0 else part
+            first, remainder = a * math.sin(part * angle), b * math.sin((1 - part) * angle)
+            end = first / (first + remainder) if first + remainder > 0 else part
             for c in range(len(circles) - 1):
                 for i in range(len(s)):
                     for j in range(len(t)):
@@ -492,14 +492,14 @@ def _put_fan(  # type: ignore[no-untyped-def]
                         x, y = (1 - tau) * ax + tau * bx, (1 - tau) * ay + tau * by
                         square = max(x * x + y * y, 1e-300)
                         reach = math.sqrt(square)
-                        low, high = circles[c] / reach, circles[c + 1] / reach
-                        if low >= 1.0:
+                        s_min, s_max = circles[c] / reach, circles[c + 1] / reach
+                        if s_min >= 1.0:
                             continue
-                        low, high = math.sqrt(low), math.sqrt(min(high, 1.0))
-                        root = low + (high - low) * s[i]
+                        s_min, s_max = math.sqrt(s_min), math.sqrt(min(s_max, 1.0))
+                        root = s_min + (s_max - s_min) * s[i]
                         u = root * root
                         # dV = 2 area u du dtau with u = s²
-                        radial_weight = 4 * root**3 * (high - low) * ws[i]
+                        radial_weight = 4 * root**3 * (s_max - s_min) * ws[i]
                         table[count, 0] = number
                         for v in range(3):
                             far_point = (1 - tau) * vertex[1, v] + tau * vertex[2, v]
@@ -585,7 +585,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
     stack, depths = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
     full_range = np.array([0.0, np.inf])
     part, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
-    vertex, one, one_corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
+    vertex, fan_vertex, fan_corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
     table, count = np.empty((len(bary) * len(plain_share), 5)), 0
     for k in range(len(bary)):
         if not bears_tip[k]:
@@ -634,7 +634,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
             if level == levels:
                 table, count = _put_fans_around(
                     table, count, k, vertex, corner, fraction,
-                    tips[tip_of_part], s, ws, t, wt, one, one_corner, full_range,
+                    tips[tip_of_part], s, ws, t, wt, fan_vertex, fan_corner, full_range,
                 )  # fmt: skip
                 continue
             for i in range(3):
@@ -738,28 +738,28 @@ def bisected_towards_fronts(bary, x, levels, share, nearness, n_bisections, tole
                 count += 1
                 top -= 1
                 continue
-            first, last, nearest, e = 0, 1, np.inf, 0
+            first, end, nearest_radius, e = 0, 1, np.inf, 0
             for i in range(3):
                 for j in range(i + 1, 4):
                     if length[e] >= (1.0 - tolerance) * longest_edge:
                         r = math.floor(
                             1e7 * _least_radius(part_levels[top], i, j) / longest_edge + 0.5
                         )
-                        if r < nearest:
-                            first, last, nearest = i, j, r
+                        if r < nearest_radius:
+                            first, end, nearest_radius = i, j, r
                     e += 1
             part_bary[top + 1], part_x[top + 1] = part_bary[top], part_x[top]
             part_levels[top + 1] = part_levels[top]
             for a in range(4):
-                middle = 0.5 * (part_bary[top, first, a] + part_bary[top, last, a])
-                part_bary[top + 1, first, a] = part_bary[top, last, a] = middle
+                middle = 0.5 * (part_bary[top, first, a] + part_bary[top, end, a])
+                part_bary[top + 1, first, a] = part_bary[top, end, a] = middle
             for a in range(3):
-                middle = 0.5 * (part_x[top, first, a] + part_x[top, last, a])
-                part_x[top + 1, first, a] = part_x[top, last, a] = middle
+                middle = 0.5 * (part_x[top, first, a] + part_x[top, end, a])
+                part_x[top + 1, first, a] = part_x[top, end, a] = middle
             for t in range(n_fronts):
                 for a in range(2):
-                    middle = 0.5 * (part_levels[top, t, first, a] + part_levels[top, t, last, a])
-                    part_levels[top + 1, t, first, a] = part_levels[top, t, last, a] = middle
+                    middle = 0.5 * (part_levels[top, t, first, a] + part_levels[top, t, end, a])
+                    part_levels[top + 1, t, first, a] = part_levels[top, t, end, a] = middle
             depth[top] += 1
             depth[top + 1] = depth[top]
             top += 1

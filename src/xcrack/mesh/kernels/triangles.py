@@ -8,30 +8,30 @@ LEAF = 4  # boxes a leaf of the tree
 
 
 @kernel
-def _is_before(item, other, low_corners, high_corners, axis):  # type: ignore[no-untyped-def]
+def _is_before(item, second_item, low_corners, high_corners, axis):  # type: ignore[no-untyped-def]
     """Whether the middle of a box comes before that of another one; equal ones by number."""
     a, b = (
         low_corners[item, axis] + high_corners[item, axis],
-        low_corners[other, axis] + high_corners[other, axis],
+        low_corners[second_item, axis] + high_corners[second_item, axis],
     )
-    return a < b or (a == b and item < other)
+    return a < b or (a == b and item < second_item)
 
 
 @kernel
-def _halve(order, first, last, low_corners, high_corners, axis):  # type: ignore[no-untyped-def]
+def _halve(order, first, end, low_corners, high_corners, axis):  # type: ignore[no-untyped-def]
     """Exchange a stretch of items until none before its middle is behind one from there on.
 
     Hoare's selection: no half is sorted, so that all of the tree takes the time of one sort.
     """
-    half, last = (first + last) // 2, last - 1
-    while first < last:
-        a, b, pivot = order[first], order[last], order[(first + last) // 2]
-        low, high = (a, b) if _is_before(a, b, low_corners, high_corners, axis) else (b, a)
-        if _is_before(pivot, low, low_corners, high_corners, axis):
-            pivot = low
-        elif _is_before(high, pivot, low_corners, high_corners, axis):
-            pivot = high
-        i, j = first, last
+    half, end = (first + end) // 2, end - 1
+    while first < end:
+        a, b, pivot = order[first], order[end], order[(first + end) // 2]
+        lead, tail = (a, b) if _is_before(a, b, low_corners, high_corners, axis) else (b, a)
+        if _is_before(pivot, lead, low_corners, high_corners, axis):
+            pivot = lead
+        elif _is_before(tail, pivot, low_corners, high_corners, axis):
+            pivot = tail
+        i, j = first, end
         while i <= j:
             while _is_before(order[i], pivot, low_corners, high_corners, axis):
                 i += 1
@@ -41,7 +41,7 @@ def _halve(order, first, last, low_corners, high_corners, axis):  # type: ignore
                 order[i], order[j] = order[j], order[i]
                 i, j = i + 1, j - 1
         if half <= j:
-            last = j
+            end = j
         elif half >= i:
             first = i
         else:
@@ -63,51 +63,51 @@ def box_tree(low_corners, high_corners):  # type: ignore[no-untyped-def]
         Items in the order of the leaves.
     node : (q, 3) array of int
         First child (the second one follows it; -1: a leaf), first and last place in `order`.
-    low, high : (q, 3) arrays
+    box_min, box_max : (q, 3) arrays
         Box of each node.
     """
     k = len(low_corners)
     order = np.arange(k)
     node = np.empty((2 * k + 1, 3), np.int64)
-    low = np.empty((2 * k + 1, 3))
-    high = np.empty((2 * k + 1, 3))
+    box_min = np.empty((2 * k + 1, 3))
+    box_max = np.empty((2 * k + 1, 3))
     node[0, 1], node[0, 2] = 0, k
-    nodes_in_use = 1
+    n_nodes = 1
     at = 0
-    while at < nodes_in_use:
-        first, last = node[at, 1], node[at, 2]
+    while at < n_nodes:
+        first, end = node[at, 1], node[at, 2]
         width, axis = -1.0, 0
         for d in range(3):
             bottom, top = np.inf, -np.inf
             middle_low, middle_high = np.inf, -np.inf
-            for place in range(first, last):
+            for place in range(first, end):
                 i = order[place]
                 bottom = min(bottom, low_corners[i, d])
                 top = max(top, high_corners[i, d])
                 middle = low_corners[i, d] + high_corners[i, d]
                 middle_low = min(middle_low, middle)
                 middle_high = max(middle_high, middle)
-            low[at, d], high[at, d] = bottom, top
+            box_min[at, d], box_max[at, d] = bottom, top
             if middle_high - middle_low > width:
                 width, axis = middle_high - middle_low, d
         node[at, 0] = -1
-        if last - first > LEAF:
-            _halve(order, first, last, low_corners, high_corners, axis)
-            half = (first + last) // 2
-            node[at, 0] = nodes_in_use
-            node[nodes_in_use, 1], node[nodes_in_use, 2] = first, half
-            node[nodes_in_use + 1, 1], node[nodes_in_use + 1, 2] = half, last
-            nodes_in_use += 2
+        if end - first > LEAF:
+            _halve(order, first, end, low_corners, high_corners, axis)
+            half = (first + end) // 2
+            node[at, 0] = n_nodes
+            node[n_nodes, 1], node[n_nodes, 2] = first, half
+            node[n_nodes + 1, 1], node[n_nodes + 1, 2] = half, end
+            n_nodes += 2
         at += 1
-    return order, node[:nodes_in_use].copy(), low[:nodes_in_use].copy(), high[:nodes_in_use].copy()
+    return order, node[:n_nodes].copy(), box_min[:n_nodes].copy(), box_max[:n_nodes].copy()
 
 
 @kernel
-def _to_box(p, low, high):  # type: ignore[no-untyped-def]
+def _to_box(p, box_min, box_max):  # type: ignore[no-untyped-def]
     """Squared distance of a point to a box."""
     square = 0.0
     for d in range(3):
-        gap = max(low[d] - p[d], p[d] - high[d])
+        gap = max(box_min[d] - p[d], p[d] - box_max[d])
         if gap > 0.0:
             square += gap * gap
     return square
@@ -159,7 +159,7 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
         for d in range(3):
             foot[d] = p[d] - height * normal[d]
         return height * height, 0
-    best = np.inf
+    least_square = np.inf
     part = 0
     for i in range(3):
         j = (i + 1) % 3
@@ -167,8 +167,8 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
         square = 0.0
         for d in range(3):
             square += (p[d] - trial[d]) * (p[d] - trial[d])
-        if square < best:
-            best = square
+        if square < least_square:
+            least_square = square
             for d in range(3):
                 foot[d] = trial[d]
             if position == 0.0:
@@ -177,25 +177,25 @@ def _to_triangle(p, corner, normal, foot, trial):  # type: ignore[no-untyped-def
                 part = 1 + j
             else:
                 part = 4 + i
-    return best, part
+    return least_square, part
 
 
 @kernel
-def _push_children(p, child, low, high, stack, stack_square, top):  # type: ignore[no-untyped-def]
+def _push_children(p, child, box_min, box_max, stack, stack_square, top):  # type: ignore[no-untyped-def]
     """Put two children on the stack, the nearer one on top, and return the new top."""
-    square = _to_box(p, low[child], high[child])
-    other_square = _to_box(p, low[child + 1], high[child + 1])
-    nearer_child, other = child, child + 1
+    square = _to_box(p, box_min[child], box_max[child])
+    other_square = _to_box(p, box_min[child + 1], box_max[child + 1])
+    nearer_child, farther_child = child, child + 1
     if other_square < square:
-        nearer_child, other = other, nearer_child
+        nearer_child, farther_child = farther_child, nearer_child
         square, other_square = other_square, square
-    stack[top + 1], stack_square[top + 1] = other, other_square
+    stack[top + 1], stack_square[top + 1] = farther_child, other_square
     stack[top + 2], stack_square[top + 2] = nearer_child, square
     return top + 2
 
 
 @kernel
-def closest_triangle(x, corners, normal, order, node, low, high, band, tolerance):  # type: ignore[no-untyped-def]
+def closest_triangle(x, corners, normal, order, node, box_min, box_max, band, tolerance):  # type: ignore[no-untyped-def]
     """Closest triangle of each point, and the part of it that is closest.
 
     Of triangles equally far (coplanar ones that overlap, say) the one with the lowest number
@@ -207,7 +207,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tolerance
     corners : (k, 3, 3) array
     normal : (k, 3) array
         Unit normals.
-    order, node, low, high : arrays
+    order, node, box_min, box_max : arrays
         Tree of the boxes of the triangles, from `box_tree`.
     band : float
         Points farther away than this find nothing.
@@ -236,12 +236,12 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tolerance
     trial = np.empty(3)
     for i in range(n):
         p = x[i]
-        best = band
-        reach = (best + tolerance) * (best + tolerance)
-        nearest = -1
+        least_gap = band
+        reach = (least_gap + tolerance) * (least_gap + tolerance)
+        number = -1
         top = 0
         stack[0] = 0
-        stack_square[0] = _to_box(p, low[0], high[0])
+        stack_square[0] = _to_box(p, box_min[0], box_max[0])
         while top >= 0:
             at = stack[top]
             far_square = stack_square[top]
@@ -250,26 +250,26 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tolerance
                 continue
             child = node[at, 0]
             if child >= 0:
-                top = _push_children(p, child, low, high, stack, stack_square, top)
+                top = _push_children(p, child, box_min, box_max, stack, stack_square, top)
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
                 square, feature = _to_triangle(p, corners[k], normal[k], foot_point, trial)
                 gap = np.sqrt(square)
-                if gap < best - tolerance or (gap <= best + tolerance and k < nearest):
+                if gap < least_gap - tolerance or (gap <= least_gap + tolerance and k < number):
                     is_better = True
                 else:
-                    is_better = nearest < 0 and gap <= best
+                    is_better = number < 0 and gap <= least_gap
                 if is_better:
-                    best = min(best, gap)
-                    reach = (best + tolerance) * (best + tolerance)
-                    nearest = k
+                    least_gap = min(least_gap, gap)
+                    reach = (least_gap + tolerance) * (least_gap + tolerance)
+                    number = k
                     distance[i] = gap
                     part[i] = feature
                     for d in range(3):
                         foot[i, d] = foot_point[d]
-        triangle[i] = nearest
-        if nearest < 0:
+        triangle[i] = number
+        if number < 0:
             distance[i] = band
             for d in range(3):
                 foot[i, d] = p[d]
@@ -277,7 +277,7 @@ def closest_triangle(x, corners, normal, order, node, low, high, band, tolerance
 
 
 @kernel
-def closest_segment(x, start, stop, order, node, low, high, band):  # type: ignore[no-untyped-def]
+def closest_segment(x, start, stop, order, node, box_min, box_max, band):  # type: ignore[no-untyped-def]
     """Closest segment of each point; of two equally far the one with the lower number.
 
     Parameters
@@ -285,7 +285,7 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
     x : (n, 3) array
     start, stop : (k, 3) arrays
         Ends of the segments.
-    order, node, low, high : arrays
+    order, node, box_min, box_max : arrays
         Tree of the boxes of the segments, from `box_tree`.
     band : float
         Points farther away than this find nothing.
@@ -308,20 +308,20 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
     foot = np.empty(3)
     for i in range(n):
         p = x[i]
-        best = band * band
-        nearest = -1
+        least_square = band * band
+        number = -1
         top = 0
         stack[0] = 0
-        stack_square[0] = _to_box(p, low[0], high[0])
+        stack_square[0] = _to_box(p, box_min[0], box_max[0])
         while top >= 0:
             at = stack[top]
             far_square = stack_square[top]
             top -= 1
-            if far_square > best:
+            if far_square > least_square:
                 continue
             child = node[at, 0]
             if child >= 0:
-                top = _push_children(p, child, low, high, stack, stack_square, top)
+                top = _push_children(p, child, box_min, box_max, stack, stack_square, top)
                 continue
             for place in range(node[at, 1], node[at, 2]):
                 k = order[place]
@@ -329,17 +329,17 @@ def closest_segment(x, start, stop, order, node, low, high, band):  # type: igno
                 square = 0.0
                 for d in range(3):
                     square += (p[d] - foot[d]) * (p[d] - foot[d])
-                if square < best or (square == best and (nearest < 0 or k < nearest)):
-                    best = square
-                    nearest = k
+                if square < least_square or (square == least_square and (number < 0 or k < number)):
+                    least_square = square
+                    number = k
                     position[i] = fraction
-        segment[i] = nearest
-        distance[i] = np.sqrt(best) if nearest >= 0 else band
+        segment[i] = number
+        distance[i] = np.sqrt(least_square) if number >= 0 else band
     return distance, segment, position
 
 
 @kernel
-def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # type: ignore[no-untyped-def]
+def crossed_triangle(start, stop, corners, normal, order, node, box_min, box_max):  # type: ignore[no-untyped-def]
     """First triangle that each segment crosses; a triangle's sides belong to it.
 
     A segment in the plane of a triangle crosses nothing.
@@ -351,7 +351,7 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
     corners : (k, 3, 3) array
     normal : (k, 3) array
         Unit normals.
-    order, node, low, high : arrays
+    order, node, box_min, box_max : arrays
         Tree of the boxes of the triangles, from `box_tree`.
 
     Returns
@@ -367,7 +367,7 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
     stack = np.empty(128, np.int64)
     point = np.empty(3)
     for i in range(n):
-        best = np.inf
+        least_share = np.inf
         top = 0
         stack[0] = 0
         while top >= 0:
@@ -376,8 +376,8 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
             is_apart = False
             for d in range(3):
                 if (
-                    min(start[i, d], stop[i, d]) > high[at, d]
-                    or max(start[i, d], stop[i, d]) < low[at, d]
+                    min(start[i, d], stop[i, d]) > box_max[at, d]
+                    or max(start[i, d], stop[i, d]) < box_min[at, d]
                 ):
                     is_apart = True
             if is_apart:
@@ -397,7 +397,7 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
                 if start_height * stop_height > 0.0 or start_height == stop_height:
                     continue
                 share = start_height / (start_height - stop_height)
-                if share >= best:
+                if share >= least_share:
                     continue
                 for d in range(3):
                     point[d] = start[i, d] + share * (stop[i, d] - start[i, d])
@@ -418,7 +418,7 @@ def crossed_triangle(start, stop, corners, normal, order, node, low, high):  # t
                     if area < -1e-12 * (ex * ex + ey * ey + ez * ez):
                         is_inside = False
                 if is_inside:
-                    best = share
+                    least_share = share
                     triangle[i] = k
                     position[i] = share
     return triangle, position
