@@ -137,7 +137,7 @@ def solve_contact(
     trials: dict[int, Multipliers] = {}
     sets, dual = 0, None
     friction_solution: FrictionSolution | None = None
-    chosen: list[Multipliers] = []
+    contacts: list[Multipliers] = []
     if problem.contact == "off":
         u: Floats | None = engine.solve(f, u_imposed)
         pending_cracks: list[int] = []
@@ -159,24 +159,24 @@ def solve_contact(
     while pending_cracks:
         for c in pending_cracks:
             spaces[c] = _space(problem, model, c, trials)
-        chosen = [m for m in spaces if m is not None]
-        if any(has_friction(problem, m.crack) for m in chosen):
+        contacts = [m for m in spaces if m is not None]
+        if any(has_friction(problem, m.crack) for m in contacts):
             friction_solution = _solve_friction(
-                problem, model, engine, chosen, f, u_imposed, reuse, is_repeated
+                problem, model, engine, contacts, f, u_imposed, reuse, is_repeated
             )
             states = friction_solution.states
         else:
             states = _solve_states(
-                problem, model, engine, chosen, f, u_imposed, (u, u_opened), reuse, load_states
+                problem, model, engine, contacts, f, u_imposed, (u, u_opened), reuse, load_states
             )
         u = np.stack([cast(Floats, state.u) for state in states], axis=1)
         sets, dual = max(state.sets for state in states), states[0].dual
         first = 0
-        for m in chosen:
-            last = first + len(m.measure)
-            pressure[m.crack] = np.stack([s.pressure[first:last] for s in states], axis=1)
-            closed_sets[m.crack] = np.stack([s.active[first:last] for s in states])
-            first = last
+        for m in contacts:
+            stop = first + len(m.measure)
+            pressure[m.crack] = np.stack([s.pressure[first:stop] for s in states], axis=1)
+            closed_sets[m.crack] = np.stack([s.active[first:stop] for s in states])
+            first = stop
         displacements = (
             u
             if friction_solution is None
@@ -199,7 +199,7 @@ def solve_contact(
             spaces[c] = pressure[c] = closed_sets[c] = None
     if dual is not None and expected_cracks:
         is_retained = np.repeat(
-            [spaces[m.crack] is not None for m in chosen], [len(m.measure) for m in chosen]
+            [spaces[m.crack] is not None for m in contacts], [len(m.measure) for m in contacts]
         )
         dual = dual[np.ix_(is_retained, is_retained)]
     return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(closed_sets), sets, dual)
@@ -209,7 +209,7 @@ def _solve_friction(
     problem: Problem,
     model: System,
     engine: Engine,
-    chosen: list[Multipliers],
+    spaces: list[Multipliers],
     f: Floats,
     u_imposed: Floats,
     reuse: SolverState,
@@ -217,22 +217,22 @@ def _solve_friction(
 ) -> FrictionSolution:
     """The load path of all states; substeps count where a crack has no multipliers yet."""
     is_closed_first = problem.numerics.initial_set == "closed"
-    cracks_with_contact = {m.crack for m in chosen}
+    cracks_with_contact = {m.crack for m in spaces}
     has_others = any(
         len(lips) and c not in cracks_with_contact for c, lips in enumerate(model.lips)
     )
-    start, size = _start(chosen, reuse, 0, is_closed_first), _face_size(model, chosen)
+    start, size = _start(spaces, reuse, 0, is_closed_first), _face_size(model, spaces)
     stiffness = problem.elasticity.largest_modulus / size
     earlier_slip = reuse.slip if is_repeated else None
     springs = None
     method = problem.numerics.contact_method
     if method is not None:
-        springs = [method.compliance(problem, model, m) for m in chosen]
+        springs = [method.compliance(problem, model, m) for m in spaces]
     return solve_friction(
         problem,
         model,
         engine,
-        chosen,
+        spaces,
         f,
         u_imposed,
         start,
@@ -247,7 +247,7 @@ def _solve_states(
     problem: Problem,
     model: System,
     engine: Engine,
-    chosen: list[Multipliers],
+    spaces: list[Multipliers],
     f: Floats,
     u_imposed: Floats,
     guess: tuple[Floats | None, Floats | None],
@@ -256,19 +256,19 @@ def _solve_states(
 ) -> list[StateContact]:
     """Contact of all load states; `guess` is the latest u and that of open faces."""
     is_closed_first = problem.numerics.initial_set == "closed"
-    start = [_start(chosen, reuse, k, is_closed_first) for k in range(f.shape[1])]
+    start = [_start(spaces, reuse, k, is_closed_first) for k in range(f.shape[1])]
     method = problem.numerics.contact_method
     if method is not None:
         return cast(
             list[StateContact],
             method.solve_states(
-                problem, model, engine, chosen, f, u_imposed, start, is_closed_first, load_states
+                problem, model, engine, spaces, f, u_imposed, start, is_closed_first, load_states
             ),
         )
-    rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in chosen]
+    rows = [gap_rows(m, model.lips[m.crack], model.jumps[m.crack]) for m in spaces]
     N = rows[0] if len(rows) == 1 else sp.csr_matrix(sp.vstack(rows))
-    measure = np.concatenate([m.measure for m in chosen])
-    stiffness = problem.elasticity.largest_modulus / _face_size(model, chosen)
+    measure = np.concatenate([m.measure for m in spaces])
+    stiffness = problem.elasticity.largest_modulus / _face_size(model, spaces)
     conditions = ContactRows(N, measure, stiffness, is_closed_first)
     return engine.contact(conditions, f, u_imposed, start, *guess)
 
@@ -330,19 +330,19 @@ def material_numbers(problem: Problem) -> Ints | None:
     return number if len(number) else None
 
 
-def _start(chosen: list[Multipliers], reuse: SolverState, k: int, is_closed: bool) -> Bools | None:
+def _start(spaces: list[Multipliers], reuse: SolverState, k: int, is_closed: bool) -> Bools | None:
     """Closed set that state k starts from; None where no step came before."""
     if not reuse.centre:
         return None
     parts = []
-    for m in chosen:
+    for m in spaces:
         earlier_set = reuse.start(m.crack, m.centre, k)
         parts.append(np.full(len(m.measure), is_closed) if earlier_set is None else earlier_set)
     return np.concatenate(parts)
 
 
-def _face_size(model: System, chosen: list[Multipliers]) -> float:
-    cells = np.unique(np.concatenate([model.lips[m.crack].cell.ravel() for m in chosen]))
+def _face_size(model: System, spaces: list[Multipliers]) -> float:
+    cells = np.unique(np.concatenate([model.lips[m.crack].cell.ravel() for m in spaces]))
     return float(model.space.mesh.cell_size[cells].mean())
 
 
@@ -351,7 +351,7 @@ def contact_of(
 ) -> tuple[Contact | None, ...]:
     """Contact of each crack in state k, None where it has no multipliers."""
     result: list[Contact | None] = []
-    work_of_crack = {each.crack: each for each in solution.friction_work}
+    work_of_crack = {work.crack: work for work in solution.friction_work}
     for c, lips in enumerate(model.lips):
         m, pressure, is_active = solution.spaces[c], solution.pressure[c], solution.active[c]
         if m is None or pressure is None or is_active is None:
@@ -381,10 +381,10 @@ def _friction_fields(m: Multipliers, work: FrictionWork, u: Floats, k: int) -> d
     is_stuck = np.asarray(m.values @ work.stuck[k].astype(float)) >= 0.5
     shear = np.stack([m.values @ tractions[:, k] for tractions in work.shear], axis=1)
     slip = np.stack([jump @ u for jump in work.jumps], axis=1)
-    one = (slice(None), 0) if len(work.jumps) == 1 else ()
+    component = (slice(None), 0) if len(work.jumps) == 1 else ()
     return {
-        "tangent": lock(work.tangents[one]),
-        "shear": lock(np.ascontiguousarray(shear[one])),
-        "slip": lock(np.ascontiguousarray(slip[one])),
+        "tangent": lock(work.tangents[component]),
+        "shear": lock(np.ascontiguousarray(shear[component])),
+        "slip": lock(np.ascontiguousarray(slip[component])),
         "stuck": lock(is_stuck),
     }

@@ -70,9 +70,9 @@ def slip_of(
     u : (n_dof,) array, length
     """
     result: list[SlipField | None] = [None] * len(model.lips)
-    for each in works:
-        slip = np.stack([jump @ u for jump in each.jumps], axis=1)
-        result[each.crack] = _SLIP[model.space.dim].slip_left(model, each, slip)
+    for work in works:
+        slip = np.stack([jump @ u for jump in work.jumps], axis=1)
+        result[work.crack] = _SLIP[model.space.dim].slip_left(model, work, slip)
     return tuple(result)
 
 
@@ -122,10 +122,8 @@ def _again_2d(model: System, c: int, tangents: Floats, earlier_slip: SlipField) 
 
 def _again_3d(model: System, c: int, tangents: Floats, earlier_slip: SlipField) -> Floats:
     """Of the nearest point before, none farther than its own piece of face is wide."""
-    distance, nearest = cKDTree(earlier_slip.points).query(model.lips[c].x)
-    slip = np.where(
-        (distance <= earlier_slip.place[nearest])[:, None], earlier_slip.slip[nearest], 0.0
-    )
+    distance, rows = cKDTree(earlier_slip.points).query(model.lips[c].x)
+    slip = np.where((distance <= earlier_slip.place[rows])[:, None], earlier_slip.slip[rows], 0.0)
     return np.einsum("qmd,qd->qm", tangents, slip)
 
 
@@ -148,11 +146,11 @@ def _first_point_number(old_points: Floats, new_points: Floats) -> int:
 
 def _distance(old_points: Floats, new_points: Floats, shift: int) -> float:
     """Median distance of old points to the new ones that they would be."""
-    first, last = max(0, -shift), min(len(old_points), len(new_points) - shift)
+    start, stop = max(0, -shift), min(len(old_points), len(new_points) - shift)
     return float(
         np.median(
             np.linalg.norm(
-                old_points[first:last] - new_points[first + shift : last + shift], axis=1
+                old_points[start:stop] - new_points[start + shift : stop + shift], axis=1
             )
         )
     )
@@ -258,12 +256,12 @@ def shaken_down(rows: FrictionRows, d: Floats, begin: SlipPoint, substeps: int) 
         start_place = places[-1]
         places = march(rows, d, start_place, substeps)
         drift = float(np.abs((places[-1].gap - start_place.gap)[rows.n :] * weight[rows.n :]).max())
-        largest = max(float(np.abs(place.gap * weight).max()) for place in places)
-        if drift <= _RETURNED * largest:
+        jump = max(float(np.abs(place.gap * weight).max()) for place in places)
+        if drift <= _RETURNED * jump:
             return places
     warn(
         f"friction: after {_MOST_CYCLES} cycles the slip of the crack faces still changes by "
-        f"{drift:.3g} a cycle, where the largest jump is {largest:.3g}; K is "
+        f"{drift:.3g} a cycle, where the largest jump is {jump:.3g}; K is "
         "that of the last cycle."
     )
     return places
@@ -332,8 +330,8 @@ def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
 
 def _open_functions(rows: FrictionRows, place: SlipPoint) -> Bools:
     """Functions with a gap that is more than round-off."""
-    largest = float(np.abs(place.gap / rows.sizes).max(initial=0.0))
-    return np.asarray(place.gap[: rows.n] / rows.measure > _OPEN * largest)
+    largest_gap = float(np.abs(place.gap / rows.sizes).max(initial=0.0))
+    return np.asarray(place.gap[: rows.n] / rows.measure > _OPEN * largest_gap)
 
 
 def _friction_work(rows: FrictionRows, start_place: SlipPoint, state: FrictionState) -> float:
@@ -421,15 +419,15 @@ def tangential_jumps(
     space: FunctionSpace, c: int, lips: LipPoints, directions: Floats
 ) -> list[sp.csr_matrix]:
     """Jumps along directions `(q, m, d)` at the lip points, each `(q, n_dof)`."""
-    every = np.moveaxis(directions, 1, 0)
-    return [jump_matrix(space, c, lips, tangents) for tangents in every]
+    vectors = np.moveaxis(directions, 1, 0)
+    return [jump_matrix(space, c, lips, tangents) for tangents in vectors]
 
 
 def solve_friction(
     problem: Problem,
     model: System,
     engine: Engine,
-    chosen: Sequence[Multipliers],
+    spaces: Sequence[Multipliers],
     f: Floats,
     u_imposed: Floats,
     start: Bools | None,
@@ -445,7 +443,7 @@ def solve_friction(
     problem : Problem
     model : System
     engine : Engine
-    chosen : sequence of Multipliers
+    spaces : sequence of Multipliers
         Of the cracks that need contact.
     f, u_imposed : (n_dof, states) arrays
     start : (g,) array of bool or None
@@ -465,15 +463,15 @@ def solve_friction(
     ConvergenceError
         A load for which no status of the functions stays.
     """
-    faces = [_face(problem, model, m) for m in chosen]
+    faces = [_face(problem, model, m) for m in spaces]
     rubbing_faces = [face for face in faces if face.mu > 0]
     slip_rows = [face.slip_rows[k] for k in range(model.space.dim - 1) for face in rubbing_faces]
     N = sp.csr_matrix(sp.vstack([face.normal for face in faces] + slip_rows))
     condensed = engine.condense(N, f, u_imposed)
     rows = _rows(faces, condensed.dual, stiffness)
     if springs is not None:
-        every = np.concatenate(springs)
-        diagonal = np.concatenate([every, np.tile(every[rows.rubbing_rows], rows.tangents)])
+        eps = np.concatenate(springs)
+        diagonal = np.concatenate([eps, np.tile(eps[rows.rubbing_rows], rows.tangents)])
         method = problem.numerics.contact_method
         is_augmented = method is not None and method.updates
         rows = replace(

@@ -243,15 +243,15 @@ def _split_groups(
         while len(waiting_functions):
             has_group = group_of[p] >= 0
             shared_overlap = overlap[waiting_functions] * has_group
-            best = (
+            host = (
                 shared_overlap.argmax(axis=1)
                 if has_group.any()
                 else np.zeros(len(waiting_functions), dtype=np.int64)
             )
-            is_joining = shared_overlap[np.arange(len(waiting_functions)), best] > 0
+            is_joining = shared_overlap[np.arange(len(waiting_functions)), host] > 0
             if not is_joining.any():
                 break
-            group_of[p, waiting_functions[is_joining]] = group_of[p, best[is_joining]]
+            group_of[p, waiting_functions[is_joining]] = group_of[p, host[is_joining]]
             waiting_functions = waiting_functions[~is_joining]
     # What found none stays with the piece of its group that stands elsewhere, or with the first.
     for p, g in zip(*np.nonzero((group_of < 0) & (mass > 1e-14 * typical_total))):
@@ -411,28 +411,28 @@ def _nearest_nodes(
     point = np.arange(len(counts)).repeat(counts)
     uncovered_entries = np.nonzero(~is_covered[traces.indices])[0]
     row, place = ranges(counts[point[uncovered_entries]])
-    uncovered_entries, other = (
+    uncovered_entries, partner = (
         uncovered_entries[row],
         traces.indptr[point[uncovered_entries]][row] + place,
     )
-    is_shared = is_covered[traces.indices[other]]
-    uncovered_entries, other = uncovered_entries[is_shared], other[is_shared]
+    is_shared = is_covered[traces.indices[partner]]
+    uncovered_entries, partner = uncovered_entries[is_shared], partner[is_shared]
     pair, number = np.unique(
-        traces.indices[uncovered_entries] * np.int64(len(is_covered)) + traces.indices[other],
+        traces.indices[uncovered_entries] * np.int64(len(is_covered)) + traces.indices[partner],
         return_inverse=True,
     )
     products = (
-        traces.data[uncovered_entries] * weight[point[uncovered_entries]] * traces.data[other]
+        traces.data[uncovered_entries] * weight[point[uncovered_entries]] * traces.data[partner]
     )
     overlap = np.bincount(number, products, len(pair))
     node, to = np.divmod(pair, len(is_covered))
     # Of overlaps that are equal but for round-off the first node counts.
-    largest = np.zeros(len(is_covered))
-    np.maximum.at(largest, node, overlap)
-    share = np.rint(overlap / (_SAME * np.where(largest > 0, largest, 1.0))[node])
-    best = np.lexsort((to, -share, node))
-    first = np.unique(node[best], return_index=True)[1]
-    return list(zip(node[best][first].tolist(), to[best][first].tolist()))
+    most_overlap = np.zeros(len(is_covered))
+    np.maximum.at(most_overlap, node, overlap)
+    share = np.rint(overlap / (_SAME * np.where(most_overlap > 0, most_overlap, 1.0))[node])
+    order = np.lexsort((to, -share, node))
+    first = np.unique(node[order], return_index=True)[1]
+    return list(zip(node[order][first].tolist(), to[order][first].tolist()))
 
 
 def _places_along(space: FunctionSpace, c: int, edges: Ints) -> Floats:
@@ -440,8 +440,8 @@ def _places_along(space: FunctionSpace, c: int, edges: Ints) -> Floats:
     mesh, t = space.mesh, space.cuts[c].cut_edge[edges, None]
     if space.dim == 3 or not len(edges):
         return np.zeros(len(edges))
-    first, second = mesh.points[mesh.edges[edges]].transpose(1, 0, 2)
-    return arc_position(space.cracks[c].points, (1 - t) * first + t * second)
+    begin, end = mesh.points[mesh.edges[edges]].transpose(1, 0, 2)
+    return arc_position(space.cracks[c].points, (1 - t) * begin + t * end)
 
 
 def vital_edges(pairs: Ints, length: Floats, place: Floats) -> Ints:
@@ -495,11 +495,11 @@ def vital_edges(pairs: Ints, length: Floats, place: Floats) -> Ints:
 
 def _in_steps(sizes: Floats) -> list[int]:
     """Sizes as whole numbers of steps of 1e-6 of the largest: equal ones but for round-off tie."""
-    largest = float(np.abs(sizes).max(initial=0.0))
-    return np.rint(sizes / ((_SAME * largest) or 1.0)).astype(np.int64).tolist()
+    scale = float(np.abs(sizes).max(initial=0.0))
+    return np.rint(sizes / ((_SAME * scale) or 1.0)).astype(np.int64).tolist()
 
 
-def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
+def _knots(centre: Floats, ends: tuple[float, float], share: float) -> Floats:
     """Knots of hats, the first and the last one at the ends of the crack.
 
     A group's size is an accident of the mesh. What counts is the piece between the last two knots
@@ -516,8 +516,8 @@ def _knots(centre: Floats, ends: tuple[float, float], last: float) -> Floats:
         old_knots = knots.copy()
         knots[2:-2] = (old_knots[1:-3] + 2 * old_knots[2:-2] + old_knots[3:-1]) / 4
         # Half of the way only: with four knots both ends would pass each other.
-        knots[1] = (old_knots[1] + old_knots[0] + last * (old_knots[2] - old_knots[0])) / 2
-        knots[-2] = (old_knots[-2] + old_knots[-1] - last * (old_knots[-1] - old_knots[-3])) / 2
+        knots[1] = (old_knots[1] + old_knots[0] + share * (old_knots[2] - old_knots[0])) / 2
+        knots[-2] = (old_knots[-2] + old_knots[-1] - share * (old_knots[-1] - old_knots[-3])) / 2
     return knots
 
 
@@ -527,25 +527,25 @@ def _curved_points(lips: LipPoints, rows: Ints, place: Floats) -> Bools:
     turn = np.unwrap(np.arctan2(ny, nx))
     if not len(turn) or np.ptp(turn) <= _CURVED:  # straight faces need no look at each point
         return np.zeros(len(turn), dtype=bool)
-    first, last = np.searchsorted(place, place - 1), np.searchsorted(place, place + 1, "right")
-    return np.array([np.ptp(turn[a:b]) > _CURVED for a, b in zip(first, last)], dtype=bool)
+    start, stop = np.searchsorted(place, place - 1), np.searchsorted(place, place + 1, "right")
+    return np.array([np.ptp(turn[a:b]) > _CURVED for a, b in zip(start, stop)], dtype=bool)
 
 
 def _knots_by_groups(
     knots: Floats, s: Floats, is_curved: Bools, hats: tuple[float, float]
 ) -> Floats:
     """Knots spread like the groups' centres, that reach the ends of the crack."""
-    density_ratio, last = hats
+    density_ratio, end_share = hats
     ends = float(s.min()), float(s.max())
     if density_ratio == 1 or len(knots) < 2:
-        return _knots(knots, ends, last)
+        return _knots(knots, ends, end_share)
     # Knots between two centres, by the share of the faces between them that is straight.
     piece = np.clip(np.searchsorted(knots, s) - 1, 0, len(knots) - 2)
     total = np.bincount(piece, minlength=len(knots) - 1)
     share = np.bincount(piece, is_curved, len(knots) - 1) / np.maximum(total, 1)
     rise = np.append(0.0, np.cumsum(density_ratio - (density_ratio - 1) * share))
     place = np.linspace(0, rise[-1], max(int(rise[-1] + 1e-9), 1) + 1)
-    return _knots(np.interp(place, rise, knots), ends, last)
+    return _knots(np.interp(place, rise, knots), ends, end_share)
 
 
 def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, float]) -> Floats:
@@ -554,7 +554,7 @@ def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, 
     They are spread between the centres of the first and the last group, as those of a whole crack:
     the first piece at a kink, where pressures are singular, is as long as a tip's.
     """
-    density_ratio, last = hats
+    density_ratio, end_share = hats
     s, places = lips.s[rows], np.cumsum(groups) - groups / 2
     density = np.where(_curved_points(lips, rows, places), 1.0, density_ratio)
     mean = float(groups @ density / groups.sum())
@@ -562,7 +562,7 @@ def _even_knots(lips: LipPoints, rows: Ints, groups: Floats, hats: tuple[float, 
     weight = groups * density
     centres = np.linspace(mean / 2, weight.sum() - mean / 2, count)
     knots = np.interp(centres, np.cumsum(weight) - weight / 2, s)
-    return _knots(knots, (float(s.min()), float(s.max())), last)
+    return _knots(knots, (float(s.min()), float(s.max())), end_share)
 
 
 def _hats(knots: Floats, s: Floats) -> sp.csr_matrix:

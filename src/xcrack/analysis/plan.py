@@ -104,8 +104,8 @@ def _memory(
 ) -> float:
     """Bytes that a solution of so many unknowns takes."""
     if not by_iteration:
-        each, power = _OF_FACTOR[problem.mesh.dim]
-        return each * float(standard + enriched) ** power
+        factor, power = _OF_FACTOR[problem.mesh.dim]
+        return factor * float(standard + enriched) ** power
     memory = float(np.dot(_OF_ROWS[problem.order or 1], (standard, enriched)))
     memory += _OF_STATE * (n_states - 1) * (standard + enriched)
     return memory * (_RUBBING if problem.contact != "off" and any(problem.frictions) else 1.0)

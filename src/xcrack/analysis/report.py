@@ -94,9 +94,9 @@ def report(
     rows = []
     n_heaviside = sum(int((h >= 0).sum()) for h in space.heaviside) * d
     basis = problem.numerics.tip_basis
-    each = [d * tip.functions if basis is None else basis.unknowns(d) for tip in space.tips]
+    unknowns = [d * tip.functions if basis is None else basis.unknowns(d) for tip in space.tips]
     n_points = [int((tip.point_to_function >= 0).sum()) for tip in space.tips]
-    n_tip = sum(n * k for n, k in zip(n_points, each, strict=True))
+    n_tip = sum(n * k for n, k in zip(n_points, unknowns, strict=True))
     for row in ingredients_of(problem):
         if row.name == "Heaviside functions":
             row = replace(row, unknowns=n_heaviside)
@@ -133,11 +133,11 @@ def report(
                 )
             )
     if problem.junctions:
-        where = [
+        places = [
             f"{junction.crack} on {junction.on} at {at(junction.x)}"
             for junction in problem.junctions
         ]
-        rows.append(Ingredient("ends on other cracks", True, ", ".join(where)))
+        rows.append(Ingredient("ends on other cracks", True, ", ".join(places)))
     if outcome.unbalanced_share is not None:
         share = f"{outcome.unbalanced_share:.2%}"
         reason = f"{share} of its energy is out of balance: it relaxes without any crack"
@@ -295,7 +295,7 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
         words = "give loads=[...], or a displacement that is not zero: K is zero everywhere."
         return [Alarm("the largest displacement", 0.0, 0.0, "in all load states", words)]
     # What is imposed has no unit of a modulus.
-    forces = any("support" not in load.acts for each in solutions for load in each.loads)
+    forces = any("support" not in load.acts for s in solutions for load in s.loads)
     if not has_units(problem) or not forces:
         return []
     alarms = [_displacement(solution) for solution in solutions]

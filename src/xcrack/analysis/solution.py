@@ -137,13 +137,13 @@ class Solution:
         if not isinstance(level, Real) or any(load.is_steady for load in self.loads):
             raise ProblemError("only a solution of a factor on loads that are not steady scales.")
         contact = []
-        for each in self.contact:
-            values = {} if each is None else {
-                name: lock(factor * getattr(each, name))
+        for crack_contact in self.contact:
+            values = {} if crack_contact is None else {
+                name: lock(factor * getattr(crack_contact, name))
                 for name in ("pressure", "gap", "shear", "slip")
-                if getattr(each, name) is not None
+                if getattr(crack_contact, name) is not None
             }  # fmt: skip
-            contact.append(None if each is None else replace(each, **values))
+            contact.append(None if crack_contact is None else replace(crack_contact, **values))
         return replace(
             self,
             state=factor * float(level),

@@ -76,11 +76,11 @@ def out_of_balance(problem: Problem, model: System, loads: Sequence[Load]) -> fl
     n = space.n_nodes * space.dim
     points = body_points(space)
     x = position(space, points.cell, points.bary)
-    elasticity, where = problem.elasticity, (points.cell, points.bary)
+    elasticity, at = problem.elasticity, (points.cell, points.bary)
     sigma = np.zeros((len(x), space.dim, space.dim))
     for load in stresses:
-        sigma = sigma + elasticity.initial_stress(load, x, *where)
-    energy = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *where))
+        sigma = sigma + elasticity.initial_stress(load, x, *at)
+    energy = np.einsum("q,qij,qij->", points.weight, sigma, elasticity.strain(sigma, *at))
     if energy <= 0:
         return None
     free_forces = ~model.imposed_values.is_fixed[:n]
@@ -231,9 +231,9 @@ def _solve_states(
         unbalanced_share,
     )  # fmt: skip
     solutions = []
-    inner = times(engine.matrix, u)
+    all_forces = times(engine.matrix, u)
     for k, (state, case) in enumerate(zip(states, cases, strict=True)):
-        forces = inner[:, k]
+        forces = all_forces[:, k]
         rows = resultants(problem, model, case.load_state.loads, case.parts, forces - case.f)
         solutions.append(
             Solution(
@@ -314,8 +314,8 @@ def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats
     load_state = problem.state(state)
     parts = []
     new_loads = list({id(load): load for load, _ in load_state if id(load) not in vectors}.values())
-    each = load_vectors(model.space, problem.elasticity, new_loads, model.lips)
-    vectors.update(zip(map(id, new_loads), each, strict=True))
+    new_vectors = load_vectors(model.space, problem.elasticity, new_loads, model.lips)
+    vectors.update(zip(map(id, new_loads), new_vectors, strict=True))
     for load, factor in load_state:
         vector = vectors[id(load)]
         parts.append(vector if factor == 1 else factor * vector)
@@ -331,11 +331,11 @@ def _case(problem: Problem, model: System, state: Any, vectors: dict[int, Floats
             factor * imposed_values.value,
             u_imposed,
         )
-    largest = max(np.abs(f).max(initial=0.0), np.abs(u_imposed).max(initial=0.0))
-    if not largest < _LARGEST:
+    size = max(np.abs(f).max(initial=0.0), np.abs(u_imposed).max(initial=0.0))
+    if not size < _LARGEST:
         raise ProblemError(
             f"the loads of state {value_text(state)} give forces or displacements of up to "
-            f"{largest:.3g}, whose squares are no numbers: take other units."
+            f"{size:.3g}, whose squares are no numbers: take other units."
         )
     return LoadCase(load_state, f, tuple(parts), u_imposed)
 
