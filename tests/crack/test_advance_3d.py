@@ -371,7 +371,7 @@ def test_drawn_growth_gives_sound_surfaces(seed):
         crack = advance_fronts(crack, s, np.zeros(q, int), angle, da, size)
         assert check(crack, before) > 1e-5
         assert np.isfinite(front_frames(crack)[0].frame).all()
-        assert front_frames(crack)[0].closed == frames.closed
+        assert front_frames(crack)[0].is_closed == frames.is_closed
 
 
 @pytest.mark.parametrize(

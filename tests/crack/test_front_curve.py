@@ -128,7 +128,7 @@ def test_bad_fronts_are_named():
         flat_front(twice, twice)
     with pytest.raises(GeometryError, match="more than 2"):
         flat_front(clockwise[:2], clockwise[:2])
-    assert flat_front(clockwise, clockwise).closed
+    assert flat_front(clockwise, clockwise).is_closed
 
 
 def _frames(x):

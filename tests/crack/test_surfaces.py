@@ -219,7 +219,7 @@ def check_fronts(crack, body, plane=True):
         depth, _ = body.depth(front.x)
         size = body.cell_size(front.x)
         counts.append(int((depth < 0).sum()))
-        if not front.closed:
+        if not front.is_closed:
             assert (depth[[0, -1]] >= 1.99 * size[[0, -1]]).all()
         else:
             assert (depth < 0).all()
@@ -343,8 +343,8 @@ def test_two_pieces_and_a_hole(cube, body):
     placed = place_surface(surface_crack(disc.points, disc.faces[r > 0.35]), cube)
     outer, inner = front_frames(placed)
     assert check_fronts(placed, body) == [len(outer.x), len(inner.x)]
-    assert outer.closed
-    assert inner.closed
+    assert outer.is_closed
+    assert inner.is_closed
     assert (np.einsum("ij,ij->i", outer.x, outer.frame[:, 0]) > 0).all()
     assert (np.einsum("ij,ij->i", inner.x, inner.frame[:, 0]) < 0).all()
     two = surface_crack(
@@ -360,10 +360,10 @@ def grown(crack, da):
     for front in front_frames(crack):
         number = len(points) + np.arange(len(front.x))
         new, row = ruled_strip(
-            len(points), front.number, front.x, da * front.frame[:, 0], 1, front.closed
+            len(points), front.number, front.x, da * front.frame[:, 0], 1, front.is_closed
         )
         points, faces = np.concatenate([points, new]), np.concatenate([faces, row])
-        fronts.append(np.append(number, number[:1]) if front.closed else number)
+        fronts.append(np.append(number, number[:1]) if front.is_closed else number)
     return Crack(points, faces, None, tuple(fronts))
 
 
@@ -416,7 +416,7 @@ def test_drawn_cracks_have_ends_outside(seed, cube, body):
         for number, front in zip(placed.fronts, front_frames(placed), strict=True):
             assert all(pair in edges for pair in zip(number[:-1], number[1:], strict=True))
             depth, _ = body.depth(front.x[[0, -1]])
-            assert front.closed or (depth > 1.9 * body.cell_size(front.x[[0, -1]])).all()
+            assert front.is_closed or (depth > 1.9 * body.cell_size(front.x[[0, -1]])).all()
         again = place_surface(placed, cube)
         np.testing.assert_array_equal(again.points, placed.points)
     assert accepted >= 9

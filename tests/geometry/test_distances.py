@@ -205,7 +205,7 @@ def test_spherical_cap_converges():
         surface = extended_surface(placed, mesh, 0.4)
         front = front_frames(placed)[0]
         phi, triangle, _ = surface_distance(x, surface.points, surface.triangles)
-        r, _, _ = front_distance(x, front.x, front.closed)
+        r, _, _ = front_distance(x, front.x, front.is_closed)
         error.append((np.abs(phi - radius + 1)[behind].max(), np.abs(r - exact_r).max()))
         close = (exact_r > 0.05) & (exact_r < 0.2) & (np.abs(ahead) > 0.5 * edge)
         sign = np.where(surface.label[triangle] == 1, 1, -1)

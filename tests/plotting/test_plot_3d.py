@@ -307,7 +307,7 @@ def test_fronts_without_K_are_those_of_the_crack():
     bare = Step(0, 0.0, step.cracks, ((replace(step.sif[0][0], **every),),), *[nothing] * 5)
     (line,) = step_fronts(bare, 0)
     np.testing.assert_array_equal(line.x, step_fronts(step, 0)[0].x)
-    assert line.closed
+    assert line.is_closed
 
 
 def test_history_in_space(tmp_path, history):

@@ -74,7 +74,7 @@ def test_redundant_functions_share():
 def test_nothing_presses():
     rows, d = drawn(72)
     state = coulomb(rows, np.abs(d), all_stuck(rows))
-    assert not state.status.closed.any() or state.lam[: rows.n].min() >= 0
+    assert not state.status.is_closed.any() or state.lam[: rows.n].min() >= 0
 
 
 # Two tangents ------------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ def angle_on_ellipse(x, a, b):
 
 def along_front(curve, knots, n=4):
     """Gauss points between tops of hats: parameters and weights."""
-    grid = np.append(knots, knots[0] + curve.length) if curve.closed else knots
+    grid = np.append(knots, knots[0] + curve.length) if curve.is_closed else knots
     t, w = GAUSS(n)
     width = np.diff(grid)[:, None]
     return (grid[:-1, None] + width * (t + 1) / 2).ravel(), (width * w / 2).ravel()

@@ -280,7 +280,7 @@ def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: in
         d = begin.d + end * (load - begin.d)
         state = _friction_solution(rows, d, place)
         sets = max(sets, state.sets)
-        closing = state.status.closed & _open_functions(rows, place)
+        closing = state.status.is_closed & _open_functions(rows, place)
         if closing.any() and step > shortest_step:
             step = max(step / 2, shortest_step)
             continue
@@ -481,7 +481,7 @@ def solve_friction(
     if start is not None:
         status = Status(start, status.slip)
     elif problem.numerics.initial_set == "open":
-        status = Status(np.zeros_like(status.closed), status.slip)
+        status = Status(np.zeros_like(status.is_closed), status.slip)
     begin, pass_through = at_rest(rows, status), march
     if earlier_slip is not None:
         pass_through = shaken_down
@@ -500,7 +500,7 @@ def solve_friction(
     places = pass_through(rows, condensed.gap, begin, problem.numerics.substeps)
     u = condensed.displacements(np.stack([place.lam for place in places], axis=1))
     states = [
-        StateContact(p.lam[: rows.n], p.gap[: rows.n], p.status.closed, p.sets, u[:, k])
+        StateContact(p.lam[: rows.n], p.gap[: rows.n], p.status.is_closed, p.sets, u[:, k])
         for k, p in enumerate(places)
     ]
     return FrictionSolution(
@@ -547,7 +547,7 @@ def _by_crack(
     faces: Sequence[_Face], rows: FrictionRows, places: Sequence[SlipPoint]
 ) -> list[FrictionWork]:
     shear = np.stack([place.lam[rows.n :].reshape(rows.tangents, -1) for place in places], axis=2)
-    is_stuck = np.stack([p.status.closed[rows.rubbing_rows] & ~p.status.slips for p in places])
+    is_stuck = np.stack([p.status.is_closed[rows.rubbing_rows] & ~p.status.slips for p in places])
     result, first = [], 0
     for face in faces:
         rows_of_crack = slice(first, first + len(face.space.measure))

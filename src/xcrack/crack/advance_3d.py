@@ -102,7 +102,7 @@ def advance_fronts(
     number = np.asarray(front, dtype=np.int64)
     _check(crack, s, number, angle, da, size)
     fronts = front_frames(crack)
-    single_fronts = [((k,), front.closed) for k, front in enumerate(fronts)]
+    single_fronts = [((k,), front.is_closed) for k, front in enumerate(fronts)]
     chains = through_holes(crack, fronts, body) if body is not None else single_fronts
     rays_of_chains, wholes = [], []
     for members, goes_round in chains:
@@ -157,7 +157,7 @@ def _check_reach(old_front: Front, x: Floats, da: float, size: float, body: Body
     largest_reach = _REACH[0] * da + _REACH[1] * size
     if not len(x):
         return
-    distance, _, _ = front_distance(x, old_front.x, old_front.closed, 4 * largest_reach)
+    distance, _, _ = front_distance(x, old_front.x, old_front.is_closed, 4 * largest_reach)
     k = int(np.argmax(distance))
     if distance[k] > largest_reach:
         raise GeometryError(
@@ -240,7 +240,7 @@ def _strip(
     """New points and faces ahead of one front."""
     rays, vertex, normal = rays_of_front
     front = without_loops(rays)
-    if len(front.x) < 3 and old_front.closed:
+    if len(front.x) < 3 and old_front.is_closed:
         raise _closing_error(old_front)
     # A wave along the front is damped, beyond da of a few sides turned over, by the growth itself:
     # K is larger where the front lags behind. What longer steps overshoot more passes take away.
@@ -292,7 +292,7 @@ def _joined_strip(
             if not len(turned_sides):
                 return strip
         front = without_sides(_pinned_front(trial, is_pinned), turned_sides)
-        if old_front.closed and len(front.x) < 3:
+        if old_front.is_closed and len(front.x) < 3:
             raise _closing_error(old_front)
         if len(front.x) == len(trial.x):
             raise GeometryError(
@@ -339,7 +339,7 @@ def _advanced_points(
     """
     if not len(s) or da.max() == 0:
         return None
-    m, is_closed = len(old_front.x), old_front.closed
+    m, is_closed = len(old_front.x), old_front.is_closed
     next_point = np.roll(np.arange(m), -1) if is_closed else np.arange(1, m)
     first_point = np.arange(len(next_point))
     side = np.linalg.norm(old_front.x[next_point] - old_front.x[first_point], axis=1)
@@ -387,10 +387,10 @@ def _advanced_points(
 def _frames(front: Front) -> Floats:
     """Frames of a front, at its corners with the bisector of both sides for the direction ahead."""
     frame = np.array(front.frame)
-    side = steps(front.x, front.closed)
+    side = steps(front.x, front.is_closed)
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     previous_side = np.roll(side, 1, axis=0)
-    if not front.closed:
+    if not front.is_closed:
         previous_side, side = np.concatenate([side[:1], side]), np.concatenate([side, side[-1:]])
     is_sharp = np.einsum("ij,ij->i", previous_side, side) < _SHARP
     bisector = (previous_side + side)[is_sharp]
@@ -479,7 +479,7 @@ def _check_free(
     """
     new_front = front_frames(grown_crack)[number]
     is_moved = new_front.number >= len(old_crack.points)
-    if not new_front.closed:
+    if not new_front.is_closed:
         is_moved[[0, -1]] = False  # outside the body, beside the outline of the mouth
     probe = new_front.x[is_moved] + _AHEAD * size * _frames(new_front)[is_moved, 0]
     probe = probe[must_be_free(new_front.x[is_moved], size, body, meeting_points)]

@@ -33,7 +33,7 @@ _BESIDE = 4.0  # sizes from where fronts meet, and between their ends, where the
 
 def joined_front(fronts: Sequence[Front], goes_round: bool) -> tuple[Front, list[float]]:
     """Fronts in a row as one, and where on it each of them begins."""
-    if len(fronts) == 1 and fronts[0].closed == goes_round:
+    if len(fronts) == 1 and fronts[0].is_closed == goes_round:
         return fronts[0], [0.0]
     x = np.concatenate([front.x for front in fronts])
     frame = np.concatenate([front.frame for front in fronts])

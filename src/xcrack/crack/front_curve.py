@@ -67,7 +67,7 @@ class FrontCurve:
         Arc length at the vertices; a closed front ends with its first vertex again.
     place, normal : (4, m, 3) arrays
         Coefficients of the pieces, highest power first.
-    closed : bool
+    is_closed : bool
     is_cut : (bool, bool)
         Whether what lies beyond the first and the last vertex belongs to another front.
     """
@@ -75,7 +75,7 @@ class FrontCurve:
     breaks: Floats
     place: Floats
     normal: Floats
-    closed: bool
+    is_closed: bool
     is_cut: tuple[bool, bool] = (False, False)
 
     @property
@@ -110,7 +110,7 @@ class FrontCurve:
         from xcrack.crack.kernels.front import frames_at
 
         u = np.ascontiguousarray(s, dtype=float)
-        u = np.mod(u, self.length) if self.closed else u
+        u = np.mod(u, self.length) if self.is_closed else u
         return frames_at(u, self.breaks, self.place, self.normal)
 
     def feet(self, x: Floats) -> FootPoints:
@@ -150,7 +150,7 @@ class FrontCurve:
         sample, _ = nearest_vertices(lock(x.view()), samples, radius + step)
         rows = np.nonzero(sample >= 0)[0]
         picked = np.ascontiguousarray(x[rows], dtype=float)
-        curve = (self.breaks, self.place, self.normal, self.closed)
+        curve = (self.breaks, self.place, self.normal, self.is_closed)
         points = FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
         if not any(self.is_cut):
             return rows, points
@@ -183,7 +183,7 @@ class FrontCurve:
             inf where a front is straight.
         """
         start, stop = np.asarray(s) - length_of_mean / 2, np.asarray(s) + length_of_mean / 2
-        if not self.closed:
+        if not self.is_closed:
             start, stop = np.clip(start, 0.0, self.length), np.clip(stop, 0.0, self.length)
         tangent_ahead, tangent_behind = self.at(stop)[1][:, 2], self.at(start)[1][:, 2]
         angle = 2 * np.arcsin(

@@ -42,7 +42,7 @@ class Front:
         Vertices in the direction of the last row of the frames; of a closed front each once.
     frame : (m, 3, 3) array
         Rows (t ahead, n normal, b = t x n along).
-    closed : bool
+    is_closed : bool
     s : (m,) array, length
         Arc length from the first vertex.
     number : (m,) array of int
@@ -51,7 +51,7 @@ class Front:
 
     x: Floats
     frame: Floats
-    closed: bool
+    is_closed: bool
     s: Floats
     number: Ints
 

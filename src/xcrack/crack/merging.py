@@ -113,7 +113,7 @@ def _points_near(crack: Crack, crack_b: Crack, body: Body, reach: float) -> tupl
     box_min, box_max = crack_b.points.min(axis=0) - reach, crack_b.points.max(axis=0) + reach
     parts = [np.zeros((0, 6))]
     for front in front_frames(crack):
-        number = np.arange(len(front.x) + front.closed)
+        number = np.arange(len(front.x) + front.is_closed)
         t = np.linspace(0, number[-1], _BETWEEN * number[-1] + 1)
         corners = np.hstack([front.x, front.frame[:, 1]])[number % len(front.x)]
         parts.append(np.stack([np.interp(t, number, column) for column in corners.T], axis=1))
@@ -125,7 +125,7 @@ def _points_near(crack: Crack, crack_b: Crack, body: Body, reach: float) -> tupl
 
 def _is_on_front(crack: Crack, x: Floats, tolerance: float) -> bool:
     return any(
-        front_distance(x[None], front.x, front.closed, np.inf)[0][0] <= 10 * tolerance
+        front_distance(x[None], front.x, front.is_closed, np.inf)[0][0] <= 10 * tolerance
         for front in front_frames(crack)
     )
 
@@ -206,7 +206,7 @@ def _first_that_closes(
 ) -> Crack:
     """A gap closed between fronts with all, or a few, of their points outside the body."""
     longest_front = max(len(front.x) for group in groups for front in group)
-    is_open = any(not front.closed for group in groups for front in group)
+    is_open = any(not front.is_closed for group in groups for front in group)
     for count in (longest_front, *range(8, -1, -1)) if is_open else (longest_front,):
         try:
             return close_gap(count)
@@ -235,7 +235,7 @@ def own_gap(crack: Crack, body: Body, reach: float) -> OwnGap | None:
     reach : float
         In cells; farther apart they do not count.
     """
-    fronts = [front for front in front_frames(crack) if front.closed]  # open ones: `joined_fronts`
+    fronts = [front for front in front_frames(crack) if front.is_closed]  # open: `joined_fronts`
     if not fronts:
         return None
     x = np.concatenate([front.x for front in fronts])
@@ -291,7 +291,7 @@ def _with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) ->
         flag = closest_in(tree, centre, radius).distance < _STRAIGHT * radius
         flag |= np.roll(flag, 1) & np.roll(flag, -1)  # one that its neighbours enclose
         flag &= np.linalg.norm(front.x - x, axis=1) < _LOOSE * radius
-        runs = runs_of(flag) if front.closed else open_runs(flag)
+        runs = runs_of(flag) if front.is_closed else open_runs(flag)
         parts += [(f, run) for run in runs if len(run)]
     parts.sort(key=lambda part: float(np.linalg.norm(fronts[part[0]].x[part[1]] - x, axis=1).min()))
     if len(parts) > 2 and _faces(fronts, *parts[:2]):
@@ -365,7 +365,7 @@ def through_holes(
     pairs = []
     for i, f in enumerate(fronts):
         for j, g in enumerate(fronts):
-            if f.closed or g.closed:
+            if f.is_closed or g.is_closed:
                 continue
             way = g.x[0] - f.x[-1]
             gap = float(np.linalg.norm(way))
@@ -391,7 +391,7 @@ def through_holes(
             row.append(k)
             open_fronts.discard(k)
             k = next_front.get(k, -1)
-        chains.append((tuple(row), fronts[row[0]].closed or k == row[0]))
+        chains.append((tuple(row), fronts[row[0]].is_closed or k == row[0]))
     return chains
 
 
@@ -400,7 +400,7 @@ def ends_at_holes(crack: Crack, body: Body) -> list[Floats]:
     fronts, result = front_frames(crack), []
     for row, goes_round in through_holes(crack, fronts, body):
         pairs = list(zip(row, row[1:]))
-        if goes_round and not fronts[row[0]].closed:
+        if goes_round and not fronts[row[0]].is_closed:
             pairs.append((row[-1], row[0]))
         result += [(fronts[i].x[-1] + fronts[j].x[0]) / 2 for i, j in pairs]
     return result
@@ -448,7 +448,7 @@ def joined_fronts(crack: Crack, body: Body) -> Crack | None:
 
 def _meets_in_hole(fronts: Sequence[Front], body: Body) -> bool:
     """Whether one front ends in a hole near where another one, or itself, begins in it."""
-    open_ones = [front for front in fronts if not front.closed]
+    open_ones = [front for front in fronts if not front.is_closed]
     if not open_ones:
         return False
     first, last_x = (np.array([front.x[end] for front in open_ones]) for end in (0, -1))
@@ -462,7 +462,7 @@ def _meets_in_hole(fronts: Sequence[Front], body: Body) -> bool:
 def _thirds(front: Front) -> tuple[Front, Front] | None:
     """What lies at both ends of an open front."""
     first, last_row = (int(np.searchsorted(front.s, part * front.s[-1] / 3)) for part in (1, 2))
-    if front.closed or first < 1 or last_row > len(front.x) - 2:
+    if front.is_closed or first < 1 or last_row > len(front.x) - 2:
         return None
     return _piece(front, slice(0, first + 1)), _piece(front, slice(last_row, None))
 
@@ -481,7 +481,7 @@ def _piece(front: Front, part: slice) -> Front:
 def _ends_outside(front: Front, body: Body) -> list[tuple[int, int]]:
     """Last point in the body at each end of an open front that leaves it, and which end that is."""
     is_inside = body.contains(front.x)
-    if front.closed or not is_inside.any():
+    if front.is_closed or not is_inside.any():
         return []
     places = np.nonzero(is_inside)[0]
     end_places = ((int(places[0]), 0), (int(places[-1]), -1))
@@ -512,7 +512,7 @@ def _meeting_place(f: Front, g: Front, body: Body) -> Floats | None:
     size = body.cell_size(f.x[rows])
     if not len(rows) or not body.contains(g.x).any():
         return None
-    r, segment, position = front_distance(f.x[rows], g.x, g.closed, _NEAR * float(size.max()))
+    r, segment, position = front_distance(f.x[rows], g.x, g.is_closed, _NEAR * float(size.max()))
     is_near = (segment >= 0) & (r < _NEAR * size) & (r > 0)
     rows, r, size = rows[is_near], r[is_near], size[is_near]
     segment, position = segment[is_near], position[is_near]
@@ -549,10 +549,10 @@ def _join(
 
         def is_ahead(front: Front) -> Bools:
             centre = front.x + radius * front.frame[:, 0]
-            r, segment, _ = front_distance(centre, facing_front.x, facing_front.closed, radius)
+            r, segment, _ = front_distance(centre, facing_front.x, facing_front.is_closed, radius)
             flag = (segment >= 0) & (r < radius * (1 - 1e-9))
             inner_rows = np.nonzero(body.contains(front.x))[0]
-            if not front.closed:
+            if not front.is_closed:
                 flag[: inner_rows[0]] = ends is not None and ends[k] == 0
                 flag[inner_rows[-1] + 1 :] = ends is not None and ends[k] == -1
             return np.asarray(flag)
@@ -590,7 +590,7 @@ def _nearest_ends(f: Front, g: Front, body: Body) -> tuple[int, int] | None:
 def _with_short_ends(front: Front, count: int, body: Body) -> Front:
     """An open front with at most some points outside the body at each end."""
     inner_rows = np.nonzero(body.contains(front.x))[0]
-    if front.closed or not len(inner_rows):
+    if front.is_closed or not len(inner_rows):
         return front
     return _piece(front, slice(max(int(inner_rows[0]) - count, 0), int(inner_rows[-1]) + 1 + count))
 
@@ -671,15 +671,15 @@ def _blocked_points(front: Front, tree: TriangleTree, radius: float, step: float
 
 def _runs(front: Front, is_blocked: Bools) -> list[FacingPart]:
     m = len(is_blocked)
-    if front.closed and is_blocked.all():
+    if front.is_closed and is_blocked.all():
         raise GeometryError(
             f"the front around {at(front.x.mean(axis=0))} faces another crack all the way round: "
             "one of them encloses the other."
         )
     result = []
-    for run in runs_of(is_blocked) if front.closed else open_runs(is_blocked):
+    for run in runs_of(is_blocked) if front.is_closed else open_runs(is_blocked):
         first, end = int(run[0]), int(run[-1])
-        if front.closed:
+        if front.is_closed:
             count = len(run) + 2
             result.append(
                 FacingPart(tuple(int((first - 1 + k) % m) for k in range(count)), (False, False))
@@ -693,7 +693,7 @@ def _runs(front: Front, is_blocked: Bools) -> list[FacingPart]:
 
 def _sides(front: Front) -> list[tuple[int, int]]:
     number = front.number.tolist()
-    next_number = number[1:] + number[:1] if front.closed else number[1:]
+    next_number = number[1:] + number[:1] if front.is_closed else number[1:]
     return list(zip(number, next_number))
 
 
@@ -755,7 +755,7 @@ def _up_to_end(front: Front, place: list[int], end: int, radius: float) -> list[
     if not rest:
         return place
     way = np.linalg.norm(front.x[rest] - front.x[place[end]], axis=1)
-    if front.closed or way.max() > _LOOSE * radius:
+    if front.is_closed or way.max() > _LOOSE * radius:
         raise GeometryError(
             f"a front ends where it faces another crack at {at(front.x[place[end]])}, whose front "
             "goes on: the gap between them cannot be closed."

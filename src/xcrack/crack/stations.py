@@ -282,7 +282,7 @@ def _way_inside(
     curve: FrontCurve, is_inside: Callable[[Floats], Bools]
 ) -> tuple[float, float] | None:
     """Parameters at which an open front enters and leaves the body; None if it never does."""
-    if curve.closed:
+    if curve.is_closed:
         return 0.0, curve.length
     s = np.linspace(0.0, curve.length, _SAMPLES + 1)
     rows_inside = np.nonzero(is_inside(curve.at(s)[0]))[0]
@@ -320,7 +320,7 @@ def stations_of(cracks: Sequence[Crack], mesh: Mesh) -> Stations:
         else:
             for k, front in enumerate(front_frames(crack)):
                 is_inside = partial(inside_body, cracks, c, mesh)
-                part = front_in_body(front.x, front.frame, front.closed, is_inside)
+                part = front_in_body(front.x, front.frame, front.is_closed, is_inside)
                 rows.append((c, k, part.s, part.x, part.frame))
     count = [len(row[2]) for row in rows]
     return Stations(

@@ -273,7 +273,7 @@ def extended_surface(crack: Crack, mesh: Mesh, width: float) -> ExtendedSurface:
         origin = crack.points[base]
         rays = width * direction
         strip_points, faces = ruled_strip(
-            n_points, base, origin, rays, layers, front.closed, is_crossed=True
+            n_points, base, origin, rays, layers, front.is_closed, is_crossed=True
         )
         points.append(strip_points)
         all_points = np.concatenate(points)
@@ -331,7 +331,7 @@ def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Int
     """Point numbers, directions and normals of the rays of a strip, with fans at sharp places."""
     m = len(front.x)
     next_number = np.roll(front.number, -1)
-    n_sides = m if front.closed else m - 1
+    n_sides = m if front.is_closed else m - 1
     edge = np.roll(front.x, -1, axis=0) - front.x
     # The faces run against the direction of the front.
     normal = [
@@ -345,7 +345,7 @@ def _rays(front: Front, side_normal: dict[tuple[int, int], Floats]) -> tuple[Int
     for j in range(m):
         t, n, b = front.frame[j]
         rays = [t]
-        if front.closed or 0 < j < m - 1:
+        if front.is_closed or 0 < j < m - 1:
             previous_ray, next_ray, angle = (
                 previous_direction[j],
                 outward_direction[j],
@@ -456,7 +456,7 @@ def _front_distance(
     far_distance: float,
 ) -> Floats:
     """Distance to one front along the surface, positive ahead."""
-    r, segment, position = front_distance(points, front.x, front.closed, band)
+    r, segment, position = front_distance(points, front.x, front.is_closed, band)
     has_segment = segment >= 0
     psi = np.where(is_ahead, far_distance, -far_distance)
     rows = np.nonzero(has_segment)[0]
@@ -480,7 +480,7 @@ def _shifted_psi(
     middle, length = _chords(mesh, phi, psi, cells)
     if not len(middle):
         return psi
-    _, segment, position = front_distance(middle, front.x, front.closed)
+    _, segment, position = front_distance(middle, front.x, front.is_closed)
     foot, direction = _foot(front, segment, position)
     offset = np.einsum("qd,qd->q", middle - foot, direction)
     if np.abs(offset).max() < _STRAIGHT * mesh.cell_size[cells].mean():

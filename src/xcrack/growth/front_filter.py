@@ -34,7 +34,7 @@ class FrontWaves:
         Columns: waves that keep their shape.
     decay : (n,) array
         By which exponent each of them falls over the step.
-    closed : bool
+    is_closed : bool
     length : float, length
     """
 
@@ -42,7 +42,7 @@ class FrontWaves:
     root: Floats
     modes: Floats
     decay: Floats
-    closed: bool
+    is_closed: bool
     length: float
 
 
@@ -127,7 +127,7 @@ def corrected_advance(
         return mean
 
     def change(even_advance: Floats) -> Floats:
-        later_at_places = along_front(s, later_advance, front.place, front.closed, front.length)
+        later_at_places = along_front(s, later_advance, front.place, front.is_closed, front.length)
         phi_1, phi_2 = _phi_1(front.decay), _phi_2(front.decay)
         first = _weighted_response(front, even_advance, phi_1 - phi_2 * np.exp(-front.decay) - 0.5)
         return first + _weighted_response(front, later_at_places, phi_2 - 0.5)
@@ -143,9 +143,9 @@ def _changed_advance(
     change: Callable[[Floats], Floats],
 ) -> Floats:
     """A plain advance with the change that the response makes on even points."""
-    even_advance = along_front(s, advance, front.place, front.closed, front.length)
-    change_at_places = along_front(front.place, change(even_advance), s, front.closed, front.length)
-    return np.asarray(np.maximum(advance_without + change_at_places, 0.0))
+    even_advance = along_front(s, advance, front.place, front.is_closed, front.length)
+    place_change = along_front(front.place, change(even_advance), s, front.is_closed, front.length)
+    return np.asarray(np.maximum(advance_without + place_change, 0.0))
 
 
 def _weighted_response(front: FrontWaves, values: Floats, factor: Floats) -> Floats:

@@ -192,7 +192,7 @@ def _corrected_part(
     crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
     is_inside = partial(inside_body, cracks, c, mesh)
-    places = [front_in_body(front.x, front.frame, front.closed, is_inside) for front in fronts]
+    places = [front_in_body(front.x, front.frame, front.is_closed, is_inside) for front in fronts]
     x = np.concatenate([place.x for place in places])
     number = np.repeat(np.arange(len(fronts)), [len(place.x) for place in places])
     rate = _values_beside(stations_here, solves.rate[0], x, mesh)

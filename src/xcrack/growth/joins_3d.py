@@ -305,7 +305,7 @@ def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] |
     stations = solves_of(step)[0]
     for c, crack in enumerate(step.corrected):
         for f, front in enumerate(front_frames(crack)):
-            if not front.closed or len(crack.fronts or ()) < 2:
+            if not front.is_closed or len(crack.fronts or ()) < 2:
                 continue
             outward_way = front.x.mean(axis=0) - front.x
             if np.einsum("ij,ij->i", outward_way, front.frame[:, 0]).mean() <= 0:

@@ -77,13 +77,13 @@ class Status:
 
     Attributes
     ----------
-    closed : (g,) array of bool
+    is_closed : (g,) array of bool
     slip : (r,) array of {-1, 0, 1}, or (2, r) array
         Sign of the traction of a slipping function, in 3D its direction; 0 where it sticks or is
         open.
     """
 
-    closed: Bools
+    is_closed: Bools
     slip: Ints | Floats
 
     @property
@@ -93,7 +93,7 @@ class Status:
 
     def key(self) -> bytes:
         """Bytes that name it."""
-        return self.closed.tobytes() + self.slip.tobytes()
+        return self.is_closed.tobytes() + self.slip.tobytes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +160,7 @@ def coulomb(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
 
 def of_status(rows: FrictionRows, d: Floats, status: Status) -> tuple[Floats, Floats]:
     """Tractions that a status asks for, and the gaps and slips that they leave."""
-    g, is_closed, slip = rows.n, status.closed, status.slip
+    g, is_closed, slip = rows.n, status.is_closed, status.slip
     closed_rows = np.nonzero(is_closed)[0]
     is_touching = is_closed[rows.rubbing_rows]
     stuck_rows = np.nonzero(is_touching & (slip == 0))[0]
@@ -282,14 +282,14 @@ class FrictionStart:
 
     Attributes
     ----------
-    closed : (g,) array of bool
+    is_closed : (g,) array of bool
     direction : (2, r) array
         Of slip tractions; zero where a function sticks.
     share : (r,) array
         Bound over the size of the trial: how far the direction follows the slip; 0 fixes it.
     """
 
-    closed: Bools
+    is_closed: Bools
     direction: Floats
     share: Floats
 
@@ -312,7 +312,7 @@ def coulomb_3d(rows: FrictionRows, d: Floats, start: Status) -> FrictionState:
         Neither Newton nor projections settle.
     """
     sets_tried = 0
-    guess = FrictionStart(start.closed, start.slip.astype(float), np.zeros(len(rows.mu)))
+    guess = FrictionStart(start.is_closed, start.slip.astype(float), np.zeros(len(rows.mu)))
     lam = np.zeros(len(d))
     for sweeps in _SWEEPS_OVER_CONES:
         if sweeps:
@@ -338,7 +338,7 @@ def _newton_on_cones(
         next_guess = _next_status(rows, lam, gap)
         largest_traction = float(np.abs(lam).max(initial=0.0))
         change = float(np.abs(lam - previous_lam).max(initial=0.0)) if sets > 1 else np.inf
-        same_status = np.array_equal(next_guess.closed, guess.closed) and np.array_equal(
+        same_status = np.array_equal(next_guess.is_closed, guess.is_closed) and np.array_equal(
             next_guess.direction.any(axis=0), guess.direction.any(axis=0)
         )
         direction_change = next_guess.direction - guess.direction
@@ -348,7 +348,7 @@ def _newton_on_cones(
         is_stalled = error <= _STALL * largest_traction and change >= 0.5 * previous_change
         if same_status and (is_settled or is_stalled):
             return FrictionState(
-                lam, gap, Status(next_guess.closed, next_guess.direction), sets
+                lam, gap, Status(next_guess.is_closed, next_guess.direction), sets
             ), sets
         previous_lam, previous_change, guess = lam, change, next_guess
     return None, _MOST_CONES
@@ -375,8 +375,8 @@ def _linearised_solution(
 ) -> tuple[Floats, Floats]:
     """Tractions of the linearised conditions, and the gaps and slips that they leave."""
     g, r = rows.n, len(rows.mu)
-    closed_rows = np.nonzero(guess.closed)[0]
-    touching_rows = np.nonzero(guess.closed[rows.rubbing_rows])[0]
+    closed_rows = np.nonzero(guess.is_closed)[0]
+    touching_rows = np.nonzero(guess.is_closed[rows.rubbing_rows])[0]
     active_rows = np.concatenate([closed_rows, g + touching_rows, g + r + touching_rows])
     lam = np.zeros(len(d))
     is_sliding = np.asarray(guess.direction.any(axis=0))[touching_rows]

@@ -229,7 +229,7 @@ class DirectSystem:
     def _sets(
         self, F: Floats, d: Floats, rows: ContactRows, start: Sequence[Bools | None]
     ) -> list[StateContact]:
-        set_without_start = np.full(len(rows.measure), rows.closed)
+        set_without_start = np.full(len(rows.measure), rows.is_closed)
         return [
             active_set(
                 F,

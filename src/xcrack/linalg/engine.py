@@ -160,14 +160,14 @@ class ContactRows:
     stiffness : float, stress / length
         Weighs gaps against pressures in the prediction of the set; any size works, E / h is
         natural.
-    closed : bool
+    is_closed : bool
         State that groups start from where nothing is known.
     """
 
     N: sp.csr_matrix
     measure: Floats
     stiffness: float
-    closed: bool
+    is_closed: bool
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,7 +33,7 @@ class LipFaces:
     area : (t,) array, length²
     mean_pressure, mean_gap : (t,) arrays
         Means over each triangle.
-    closed : (t,) array
+    closed_share : (t,) array
         Share of each triangle on which the crack faces touch.
     front : (k, 2) array of int
         Edges on the fronts.
@@ -52,7 +52,7 @@ class LipFaces:
     area: Floats
     mean_pressure: Floats
     mean_gap: Floats
-    closed: Floats
+    closed_share: Floats
     front: Ints
     junction: Ints
     mouth: Ints
@@ -140,7 +140,7 @@ def lip_faces(solution: Solution, crack: int) -> LipFaces:
         area=lock(area),
         mean_pressure=mean(pressure),
         mean_gap=mean(solution.opening(crack) if contact is None else contact.gap),
-        closed=mean(nothing if contact is None else contact.closed.astype(float)),
+        closed_share=mean(nothing if contact is None else contact.closed.astype(float)),
         front=lock(edges[is_front_edge]),
         junction=lock(edges[ends]),
         mouth=lock(edges[leaves]),

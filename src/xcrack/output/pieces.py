@@ -428,7 +428,7 @@ class Lips:
     s : (q,) array, length
     pressure, gap : (q,) arrays
         Pressure of contact, 0 without; normal opening.
-    closed : (q,) array of bool
+    is_closed : (q,) array of bool
     jump : (q, d) array, length
         Displacement of lip + minus that of lip -.
     minus, plus : (q, d) arrays, length
@@ -442,7 +442,7 @@ class Lips:
     s: Floats
     pressure: Floats
     gap: Floats
-    closed: Bools
+    is_closed: Bools
     jump: Floats
     minus: Floats
     plus: Floats

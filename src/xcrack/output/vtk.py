@@ -178,7 +178,7 @@ def _write_lips(solution: Solution, path: Path) -> None:
     scalars: dict[str, list[np.ndarray]] = {
         "pressure": [lip.pressure for lip in lips],
         "gap": [lip.gap for lip in lips],
-        "closed": [lip.closed.astype(np.int8) for lip in lips],
+        "closed": [lip.is_closed.astype(np.int8) for lip in lips],
         "s": [lip.s for lip in lips],
         "weight": [lip.weight for lip in solution.lips],
     }
@@ -218,8 +218,8 @@ def _write_lip_faces(solution: Solution, path: Path) -> None:
     at_points |= {f"displacement_{name}": joined_values(name) for name in ("minus", "plus")}
     at_cells: dict[str, np.ndarray] = {
         "crack": np.repeat(np.arange(len(lips)), [len(lip.area) for lip in lips]),
-        "closed": (joined_values("closed") >= 0.5).astype(np.int8),
-        "closed_share": joined_values("closed"),
+        "closed": (joined_values("closed_share") >= 0.5).astype(np.int8),
+        "closed_share": joined_values("closed_share"),
         "pressure_mean": joined_values("mean_pressure"),
         "gap_mean": joined_values("mean_gap"),
     }

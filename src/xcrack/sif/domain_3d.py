@@ -200,7 +200,7 @@ def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool
 
     Domains would reach through a hole that is smaller than they are.
     """
-    if curve.closed:
+    if curve.is_closed:
         return False, False
     space = solution.space
     tip = space.tips[t]
@@ -251,7 +251,7 @@ def _depth(solution: Solution, curve: FrontCurve, ends: tuple[float, float]) -> 
 
 def _free_ends(curve: FrontCurve, values: FrontValues) -> tuple[bool, bool]:
     """Whether a front has a first and a last end at a surface whose tractions are known."""
-    if curve.closed:
+    if curve.is_closed:
         return False, False
     is_known = values.is_known & ~values.is_smooth
     return bool(is_known[0]), bool(is_known[-1])
@@ -268,7 +268,7 @@ def _warn_unknown(x: Floats, values: FrontValues) -> None:
 def _covered_parameters(curve: FrontCurve, knots: Floats, is_valid: Bools, s: Floats) -> Bools:
     """Which parameters lie at or between valid tops of hats; ends of open fronts with them."""
     on = (np.abs(s[:, None] - knots[is_valid]) <= _ON * curve.length).any(axis=1)
-    if curve.closed:
+    if curve.is_closed:
         left_knot = np.mod(np.searchsorted(knots, s * (1 + 1e-12), side="right") - 1, len(knots))
         return np.asarray(on | (is_valid[left_knot] & is_valid[(left_knot + 1) % len(knots)]))
     left_knot = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(knots) - 2)
@@ -299,7 +299,7 @@ def front_values(
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     target_radius = _wanted_radius(solutions[0], t)
     sides = sides_around(solutions, tip.crack, curve, target_radius)
-    at_planes = (False, False) if curve.closed else _ends_at_planes(ends, sides, size)
+    at_planes = (False, False) if curve.is_closed else _ends_at_planes(ends, sides, size)
     knots = front_nodes(curve, _spacing(curve, ends, size, at_planes), ends, sum(at_planes))
     room = _room(solutions[0], t, curve, knots, size)
     room_at_sides = (
@@ -373,7 +373,7 @@ def _spacing(
 
     def spacing(s: Floats) -> Floats:
         width = np.clip(curve.bend(s, size), _CLOSEST * size, _SPACING * size)
-        if curve.closed:
+        if curve.is_closed:
             return width
         for at_plane, from_end in zip(at_planes, (s - ends[0], ends[1] - s)):
             if not at_plane:
@@ -386,9 +386,9 @@ def _spacing(
 def _room(solution: Solution, t: int, curve: FrontCurve, knots: Floats, size: float) -> Floats:
     """What bends of the front, other fronts and other cracks leave for each hat `(p,)`, length."""
     tip = solution.space.tips[t]
-    period = curve.length if curve.closed else 0.0
+    period = curve.length if curve.is_closed else 0.0
     grid = np.concatenate([[knots[-1] - period], knots, [knots[0] + period]])
-    if not curve.closed:
+    if not curve.is_closed:
         grid[[0, -1]] = knots[[0, -1]]
     share = np.linspace(0.0, 1.0, _IN_HAT)[:, None]
     s = np.concatenate(

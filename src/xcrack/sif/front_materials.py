@@ -139,7 +139,7 @@ def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) 
         A material there is not isotropic.
     """
     elasticity = solution.problem.elasticity
-    period = curve.length if curve.closed else None
+    period = curve.length if curve.is_closed else None
     ends = np.array([0.0, curve.length])
     if elasticity.is_uniform:
         return FrontMaterials((elasticity.materials[0].at_tip(),), ends, (None,), period)
@@ -192,7 +192,7 @@ def _reference(
     if not material.is_graded:
         return material.at_tip(), None
     unit, s = material.unit.at_tip(), np.linspace(begin, end, _SAMPLES + 1)[1:-1]
-    x = curve.at(np.mod(s, curve.length) if curve.closed else s)[0]
+    x = curve.at(np.mod(s, curve.length) if curve.is_closed else s)[0]
     E = np.array([elasticity.isotropic_at(place).E for place in x])
     mean = float(np.exp(np.log(E).mean()))
     return Isotropic(mean, unit.nu, unit.plane), CubicSpline(s, np.log(E / mean))

@@ -66,9 +66,9 @@ def front_nodes(
     s = np.linspace(first, last, count + 1)
     density = 1 / spacing((s[1:] + s[:-1]) / 2)
     knot_count = np.concatenate([[0.0], np.cumsum(density * np.diff(s))])
-    steps = max(_FEWEST[curve.closed] - n_planes, round(knot_count[-1]))
+    steps = max(_FEWEST[curve.is_closed] - n_planes, round(knot_count[-1]))
     knots = np.interp(np.arange(steps + 1) / steps * knot_count[-1], knot_count, s)
-    return np.asarray(knots[:-1] if curve.closed else knots)
+    return np.asarray(knots[:-1] if curve.is_closed else knots)
 
 
 def hats(curve: FrontCurve, knots: Floats, s: Floats) -> tuple[Ints, Floats, Floats]:
@@ -91,7 +91,7 @@ def hats(curve: FrontCurve, knots: Floats, s: Floats) -> tuple[Ints, Floats, Flo
     """
     count = len(knots)
     left_knot = np.searchsorted(knots, s, side="right") - 1
-    if curve.closed:
+    if curve.is_closed:
         width = np.diff(np.append(knots, knots[0] + curve.length))
         t = np.mod(s - knots[left_knot], curve.length) / width[left_knot]
         hat = np.stack([np.mod(left_knot, count), np.mod(left_knot + 1, count)], axis=1)
@@ -132,14 +132,14 @@ def reading(
     values = np.eye(len(grid))
     if len(grid) < 2:
         return np.ones((len(at), len(grid)))
-    if curve.closed and is_valid.all():
+    if curve.is_closed and is_valid.all():
         spline = CubicSpline(
             np.append(grid, grid[0] + curve.length),
             np.concatenate([values, values[:1]]),
             bc_type="periodic",
         )
         return np.asarray(spline(np.mod(at - grid[0], curve.length) + grid[0]))
-    if curve.closed:
+    if curve.is_closed:
         # The invalid part is left out: s runs from the first valid top behind the widest gap.
         gap = np.diff(np.append(grid, grid[0] + curve.length))
         turn = (int(np.argmax(gap)) + 1) % len(grid)
@@ -164,7 +164,7 @@ def reading_of_modes(
     """
     odd_matrix = reading(knots, is_valid, curve, s)
     is_at_plane = np.zeros(len(knots), dtype=bool) if is_smooth is None else is_smooth & is_valid
-    if curve.closed or not is_at_plane[[0, -1]].any():
+    if curve.is_closed or not is_at_plane[[0, -1]].any():
         return np.stack([odd_matrix] * 3)
     is_mirrored = bool(is_at_plane[0]), bool(is_at_plane[-1])
     even_matrix = reading(knots, is_valid, curve, s, is_mirrored)
@@ -483,7 +483,7 @@ def twice_as_wide(
         return result
     is_whole = bool(is_valid.all())
     pick = np.arange(0, len(rows), 2)
-    if not (curve.closed and is_whole) and pick[-1] != len(rows) - 1:
+    if not (curve.is_closed and is_whole) and pick[-1] != len(rows) - 1:
         pick = np.append(pick, len(rows) - 1)
     share = np.zeros((len(pick), len(knots)))
     share[np.arange(len(pick)), rows[pick]] = 1.0
@@ -530,7 +530,7 @@ def _factors(tip_material: Isotropic) -> Floats:
 
 def _moments(curve: FrontCurve, knots: Floats, spline: Callable[[Floats], Floats]) -> Floats:
     """Integrals of the hats over functions of the parameter, f(s) -> (3, q, v): `(3, p, v)`."""
-    grid = np.append(knots, knots[0] + curve.length) if curve.closed else knots
+    grid = np.append(knots, knots[0] + curve.length) if curve.is_closed else knots
     t, weight = (_GAUSS[0] + 1) / 2, _GAUSS[1] / 2
     s = (grid[:-1, None] + np.diff(grid)[:, None] * t).ravel()
     hat, share, _ = hats(curve, knots, s)

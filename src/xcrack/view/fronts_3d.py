@@ -53,13 +53,13 @@ class FrontLine:
     ----------
     x : (m, 3) array, length
         A closed front repeats its first point at the end.
-    closed : bool
+    is_closed : bool
     number : int
         Which front of the crack.
     """
 
     x: Floats
-    closed: bool
+    is_closed: bool
     number: int
 
 
@@ -339,7 +339,7 @@ def _drawn_lines(step: Step, crack: int, body: Body | None) -> list[Floats]:
     if body is None or not step.sif:
         return [line.x for line in lines]
     places = [x for _, x in front_ends(step.cracks[crack], body)]
-    is_whole_line = [line.closed or len(line.x) < 2 for line in lines]
+    is_whole_line = [line.is_closed or len(line.x) < 2 for line in lines]
     return [
         a.x if b else to_the_surface(a.x, places) for a, b in zip(lines, is_whole_line, strict=True)
     ]

@@ -169,7 +169,7 @@ def _draw_along(axes: Any, solution: Solution, field: str, c: int) -> None:
             name = label if i == 0 else None
             axes.plot(s[run], values[run], style, color=color, lw=1.6, label=name)
     first = True
-    for a, b in _closed_parts(lips.closed, s):
+    for a, b in _closed_parts(lips.is_closed, s):
         axes.axvspan(
             a, b, color=CLOSED, alpha=0.12, lw=0, label="crack faces touch" if first else None
         )

@@ -366,8 +366,8 @@ def is_coloured(lips: LipFaces, field: str) -> Bools:
     """
     if field == "pressure":
         is_pressed = lips.mean_pressure > 1e-6 * float(lips.mean_pressure.max(initial=0.0))
-        return np.asarray(is_pressed | (lips.closed >= _TOUCH))
-    return np.asarray(lips.closed < _TOUCH) | (field == "sliding")
+        return np.asarray(is_pressed | (lips.closed_share >= _TOUCH))
+    return np.asarray(lips.closed_share < _TOUCH) | (field == "sliding")
 
 
 def _middle_of_lips(lips: LipFaces, warp: float) -> Floats:
