@@ -138,7 +138,7 @@ def test_bounds_of_steps_and_of_K(history):
     """Paris on a power of the length: no error of steps; a spread of 1 % is 3 % of life."""
     result = life(history, LAW, scatter=Scatter(C=lognormal(0.1)), samples=100, seed=78)
     assert result.bounds["steps"] < 1e-9
-    assert result.bounds["K"] == 0
+    assert result.bounds["K"] < 1e-15  # none: round-off of powers, which differs between processors
 
     def widened(state):
         return tuple(replace(sif, spread=0.01 * np.abs(sif.K)) for sif in state)
