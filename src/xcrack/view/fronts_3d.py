@@ -168,11 +168,11 @@ def draw_K(
     ProblemError
         No such front, K of a 2D crack, labels of another number, a file that cannot be written.
     """
-    every = cast(tuple[SIF, ...], sif)
-    names = _names(labels, len(every), "draw_K")
-    for one in every:
-        if one.K.shape[1] < 3 or not (one.front == front).any():
-            front_numbers = sorted({int(f) for f in one.front}) if one.K.shape[1] > 2 else []
+    sifs = cast(tuple[SIF, ...], sif)
+    names = _names(labels, len(sifs), "draw_K")
+    for part in sifs:
+        if part.K.shape[1] < 3 or not (part.front == front).any():
+            front_numbers = sorted({int(f) for f in part.front}) if part.K.shape[1] > 2 else []
             raise ProblemError(
                 f"draw_K(front={front}): there is no such 3D front, only {front_numbers}; in 2D "
                 f"read sif.K."
@@ -181,29 +181,31 @@ def draw_K(
     window = target is None if show is None else show
     figure = new_figure((6.4, 0.8 + 2.0 * len(modes)), window, "draw_K")
     panels = figure.subplots(len(modes), 1, squeeze=False, sharex=True)[:, 0]
-    largest = max(float(np.abs(one.K[one.front == front]).max()) for one in every)
+    largest_K = max(float(np.abs(part.K[part.front == front]).max()) for part in sifs)
     for axes, mode in zip(panels, modes, strict=True):
         reach = 0.0
-        for k, (one, name) in enumerate(zip(every, names, strict=True)):
-            share, K, surface = _K_along(one, front, _MODES.index(mode))
+        for k, (part, name) in enumerate(zip(sifs, names, strict=True)):
+            share, K, surface = _K_along(part, front, _MODES.index(mode))
             color, style = f"C{k}", ("-", "--", "-.", ":")[k % 4]
             axes.plot(share, K, style, color=color, lw=1.6, label=name or None)
             axes.plot(share[surface], K[surface], "o", mfc="white", mec=color, ms=5)
-            if one.errors is not None:
-                low, high = (_K_along(one, front, _MODES.index(mode), sign)[1] for sign in (-1, 1))
-                axes.fill_between(share, low, high, color=color, alpha=0.2, lw=0)
+            if part.errors is not None:
+                K_min, K_max = (
+                    _K_along(part, front, _MODES.index(mode), sign)[1] for sign in (-1, 1)
+                )
+                axes.fill_between(share, K_min, K_max, color=color, alpha=0.2, lw=0)
             reach = max(reach, float(np.abs(K).max()))
         axes.axhline(0, color="0.7", lw=0.8, zorder=0)
         axes.set_ylabel(f"$K_{{{mode}}}$")
         axes.margins(x=0.02)
-        if reach <= _NOISE * largest:
-            axes.set_ylim(-_NOISE * (largest or 1), _NOISE * (largest or 1))
+        if reach <= _NOISE * largest_K:
+            axes.set_ylim(-_NOISE * (largest_K or 1), _NOISE * (largest_K or 1))
     panels[-1].set_xlabel("s / length of the front")
     if any(names):
         figure.legend(
             *panels[0].get_legend_handles_labels(),
             loc="outside lower center",
-            ncols=min(len(every), 3),
+            ncols=min(len(sifs), 3),
             fontsize="small",
             frameon=False,
         )
@@ -251,13 +253,13 @@ def front_axes(
         axes.add_collection(LineCollection(list(edges), colors="0.7", linewidths=0.8))
     body = None if mesh is None else Body.of(mesh)
     is_single = len(runs) == 1
-    last = max(steps[-1].index for steps in runs)
-    colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last, 1))
+    last_index = max(steps[-1].index for steps in runs)
+    colours, scale = colormaps["viridis"], Normalize(runs[0][0].index, max(last_index, 1))
     for k, (steps, name) in enumerate(zip(runs, labels, strict=True)):
         every_step = list(zip(steps, _numbers_of(steps, crack)))
         for step, numbers in [*every_step[:-1:every], every_step[-1]]:
             is_last = step is steps[-1]
-            age = (last - step.index) / max(last, 1)
+            age = (last_index - step.index) / max(last_index, 1)
             color = colours(scale(step.index)) if is_single else f"C{k}"
             for x in (x for c in numbers for x in _drawn_lines(step, c, body)):
                 axes.plot(
@@ -290,13 +292,13 @@ def front_axes(
 def _numbers_of(steps: Sequence[Step], crack: int) -> list[list[int]]:
     """Numbers in each step of a crack of the first, and of all cracks that it joins in the end."""
     number = [
-        numbers_after(len(one.cracks), other.joins, len(other.cracks))
-        for one, other in zip(steps, steps[1:])
+        numbers_after(len(step.cracks), next_step.joins, len(next_step.cracks))
+        for step, next_step in zip(steps, steps[1:])
     ]
-    last = crack
+    last_number = crack
     for next_numbers in number:
-        last = next_numbers[last]
-    rows = [[last]]
+        last_number = next_numbers[last_number]
+    rows = [[last_number]]
     for next_numbers in reversed(number):
         rows.append([c for c, next_number in enumerate(next_numbers) if next_number in rows[-1]])
     return rows[::-1]
@@ -420,8 +422,8 @@ def to_the_surface(x: Floats, places: list[Floats]) -> Floats:
     (m, 3) array
     """
     reach = 3 * float(np.linalg.norm(np.diff(x, axis=0), axis=1).max())
-    first, last = (_nearest_place(places, end, reach) for end in (x[0], x[-1]))
-    return np.concatenate([first, x, last])
+    start_place, end_place = (_nearest_place(places, end, reach) for end in (x[0], x[-1]))
+    return np.concatenate([start_place, x, end_place])
 
 
 def _nearest_place(places: list[Floats], x: Floats, reach: float) -> Floats:

@@ -43,9 +43,9 @@ def _draw_K(history: History, axes: Any) -> None:
     states = state_names(history.steps)
     for number, end in enumerate(np.unique(table["id"][table["step"] == table["step"][0]])):
         rows, label = table[table["id"] == end], _end_name(history, int(end))
-        every = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in states])
-        severe_state = np.argmax(np.hypot(every[:, 0], every[:, 1]), axis=0)
-        K_I, K_II = every[severe_state, :, np.arange(len(rows))].T
+        K = np.array([[rows[f"K_{m}_{s}"] for m in ("I", "II")] for s in states])
+        severe_state = np.argmax(np.hypot(K[:, 0], K[:, 1]), axis=0)
+        K_I, K_II = K[severe_state, :, np.arange(len(rows))].T
         axes.plot(rows["a"], K_I, "o-", ms=3, color=f"C{number}", label=f"$K_I$, {label}")
         axes.plot(rows["a"], K_II, "s--", ms=3, color=f"C{number}", label=f"$K_{{II}}$, {label}")
     axes.set(xlabel="crack length a", ylabel="K of the most severe state")
@@ -60,15 +60,15 @@ def _draw_K_of_fronts(history: History, axes: Any) -> None:
         rows, label = table[table["id"] == end], _end_name(history, int(end))
         for mode, style in (("I", "o-"), ("II", "s--"), ("III", "^:")):
             states = state_names(history.steps)
-            low, high = (_extreme_K(rows, states, mode, extreme) for extreme in ("min", "max"))
+            K_min, K_max = (_extreme_K(rows, states, mode, extreme) for extreme in ("min", "max"))
             # The sign of modes II and III goes round with the front.
-            largest = high if mode == "I" else np.maximum(np.abs(low), np.abs(high))
+            largest_K = K_max if mode == "I" else np.maximum(np.abs(K_min), np.abs(K_max))
             name = f"$K_I$, {label}" if mode == "I" else f"$|K_{{{mode}}}|$, {label}"
-            axes.plot(rows["N"], largest, style, ms=3, color=f"C{number}", label=name)
+            axes.plot(rows["N"], largest_K, style, ms=3, color=f"C{number}", label=name)
             if mode == "I":
                 name = "all $K_I$ along it"
                 axes.fill_between(
-                    rows["N"], low, high, color=f"C{number}", alpha=0.15, lw=0, label=name
+                    rows["N"], K_min, K_max, color=f"C{number}", alpha=0.15, lw=0, label=name
                 )
     _mark_joins(history, axes)
     axes.set(xlabel=f"{history.unit}s N", ylabel="largest K along the front")
@@ -82,9 +82,7 @@ def _extreme_K(rows: Any, states: list[str], mode: str, extreme: str) -> Any:
         np.array([[rows[f"K_{m}_{s}_{e}"] for e in ("min", "max")] for m in ("I", "II", "III")])
         for s in states
     ]
-    severe_state = np.argmax(
-        [np.nan_to_num(np.abs(each)).max(axis=(0, 1)) for each in ends], axis=0
-    )
+    severe_state = np.argmax([np.nan_to_num(np.abs(K)).max(axis=(0, 1)) for K in ends], axis=0)
     return np.array(
         [rows[f"K_{mode}_{states[s]}_{extreme}"][k] for k, s in enumerate(severe_state)]
     )
@@ -155,9 +153,11 @@ def _draw_path(history: History, axes: Any) -> None:
         lines = boundary_lines(history.mesh)
         axes.add_collection(LineCollection(list(lines[..., :2]), colors="0.6", linewidths=1))
         axes.autoscale_view()
-        low, high = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
-        margin = 0.03 * float((high - low).max())
-        axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin))
+        x_min, x_max = history.mesh.points.min(axis=0), history.mesh.points.max(axis=0)
+        margin = 0.03 * float((x_max - x_min).max())
+        axes.set(
+            xlim=(x_min[0] - margin, x_max[0] + margin), ylim=(x_min[1] - margin, x_max[1] + margin)
+        )
     names = crack_numbers(history.steps[-1])
     table = history.table()
     crack_of_row = _crack_of_rows(history, table)

@@ -150,9 +150,9 @@ def plot_spectrum(
         history.plot(np.arange(len(spectrum.factors)), spectrum.factors, line, ms=2.5, lw=0.9)
         history.set(xlabel=f"points of a {spectrum.unit}", ylabel="factor on the loads")
     else:
-        each = np.repeat(np.arange(len(cycles)), 2).reshape(-1, 2)
-        for x, low, high in zip(each, cycles["min"], cycles["max"], strict=True):
-            history.plot(x, (low, high), color="C0", lw=2)
+        x_of_cycles = np.repeat(np.arange(len(cycles)), 2).reshape(-1, 2)
+        for x, trough, peak in zip(x_of_cycles, cycles["min"], cycles["max"], strict=True):
+            history.plot(x, (trough, peak), color="C0", lw=2)
         history.set(xlabel="kinds of cycle", ylabel="factor on the loads")
     history.axhline(0, color="0.7", lw=0.8, zorder=0)
     size = cycles["max"] - cycles["min"]
@@ -219,8 +219,8 @@ def plot_rates(
     """
     system = Units.read(units)
     target = picture_path(file, "plot_rates")
-    low, high = (k * 1e6 / system.K for k in _RANGE) if dK is None else _limits(dK)
-    ranges = np.geomspace(low, high, 200)
+    dK_min, dK_max = (k * 1e6 / system.K for k in _RANGE) if dK is None else _limits(dK)
+    ranges = np.geomspace(dK_min, dK_max, 200)
     curves = _curves(_named_laws(laws, units), ranges, R, _LONG / system.length)
     figure = new_figure((8.0, 5.4), target is None, "plot_rates")
     axes = figure.add_subplot()
@@ -237,10 +237,12 @@ def plot_rates(
 
 
 def _limits(dK: Any) -> tuple[float, float]:
-    low, high = numbers(dK, "plot_rates: dK", (2,)).tolist()
-    if not 0 < low < high:
-        raise ProblemError(f"plot_rates: dK = ({low:g}, {high:g}): give (lowest, highest) above 0.")
-    return low, high
+    dK_min, dK_max = numbers(dK, "plot_rates: dK", (2,)).tolist()
+    if not 0 < dK_min < dK_max:
+        raise ProblemError(
+            f"plot_rates: dK = ({dK_min:g}, {dK_max:g}): give (lowest, highest) above 0."
+        )
+    return dK_min, dK_max
 
 
 def _named_laws(laws: Any, units: str) -> dict[str, Any]:

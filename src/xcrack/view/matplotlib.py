@@ -141,12 +141,12 @@ def draw_along(
 ) -> Any:
     """Pressure or opening over the distance along each crack."""
     figure = new_figure((6.4, 0.6 + 3.0 * len(cracks)), show, "plot")
-    every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
-    for axes, c in zip(every, cracks, strict=True):
+    panels = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
+    for axes, c in zip(panels, cracks, strict=True):
         _draw_along(axes, solution, field, c)
         name = f"crack {c}: " if len(solution.lips) > 1 else ""
         axes.set_xlabel(f"{name}distance s along the crack")
-    return _finish(figure, every[0], file, show, title)
+    return _finish(figure, panels[0], file, show, title)
 
 
 def _draw_along(axes: Any, solution: Solution, field: str, c: int) -> None:
@@ -213,25 +213,25 @@ def _closed_parts(is_closed: np.ndarray, s: Floats) -> list[tuple[float, float]]
 def _from_zero(axes: Any, values: Floats) -> None:
     """A range that begins at zero: noise of a constant pressure should not fill the picture."""
     top = float(np.max(values, initial=0.0))
-    low = float(np.min(values, initial=0.0))
-    reach = max(top, -low) or 1.0
-    axes.set_ylim(low - 0.05 * reach if low < -1e-6 * reach else -0.03 * reach, 1.12 * reach)
+    bottom = float(np.min(values, initial=0.0))
+    reach = max(top, -bottom) or 1.0
+    axes.set_ylim(bottom - 0.05 * reach if bottom < -1e-6 * reach else -0.03 * reach, 1.12 * reach)
 
 
 def _body_axes(points: Floats, show: bool, bar: float) -> tuple[Any, Any]:
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = _LONGER * (high - low) / float((high - low).max())
+    x_min, x_max = points.min(axis=0), points.max(axis=0)
+    size = _LONGER * (x_max - x_min) / float((x_max - x_min).max())
     size = (max(size[0], 2.0) + 0.6 + bar, max(size[1], 2.4) + 0.7)
     figure = new_figure(size, show, "plot")
     return figure, figure.add_subplot()
 
 
 def _frame(axes: Any, points: Floats) -> None:
-    low, high = points.min(axis=0), points.max(axis=0)
-    margin = 0.02 * float((high - low).max())
+    x_min, x_max = points.min(axis=0), points.max(axis=0)
+    margin = 0.02 * float((x_max - x_min).max())
     axes.set(
-        xlim=(low[0] - margin, high[0] + margin),
-        ylim=(low[1] - margin, high[1] + margin),
+        xlim=(x_min[0] - margin, x_max[0] + margin),
+        ylim=(x_min[1] - margin, x_max[1] + margin),
         xlabel="x",
         ylabel="y",
     )
@@ -269,23 +269,22 @@ def draw_cracks(
 ) -> Any:
     """Draw a field on cracks, each seen along its mean normal."""
     lips = [lip_faces(solution, c) for c in cracks]
-    planes = [best_plane(each.points, each.normal.mean(axis=0)) for each in lips]
+    planes = [best_plane(lip.points, lip.normal.mean(axis=0)) for lip in lips]
     spans = [
-        np.ptp(on_plane(each.points, plane), axis=0)
-        for each, plane in zip(lips, planes, strict=True)
+        np.ptp(on_plane(lip.points, plane), axis=0) for lip, plane in zip(lips, planes, strict=True)
     ]
     height = sum(max(1.7, min(1.0, span[1] / span[0]) * _SIZE) + 0.9 for span in spans)
     size = (_SIZE + 1.6, height + (0.4 if title else 0.0))
     figure = new_figure(size, show, "plot")
-    every = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
-    values = np.concatenate([lip_values(each, field).ravel() for each in lips])
-    low, high = rounded_range(float(values.min()), float(values.max()), field)
+    panels = figure.subplots(len(cracks), 1, squeeze=False)[:, 0]
+    values = np.concatenate([lip_values(lip, field).ravel() for lip in lips])
+    v_min, v_max = rounded_range(float(values.min()), float(values.max()), field)
     if limits is not None:
-        low, high = limits
-    colours = cmap or ("RdBu_r" if low < 0 < high else "viridis")
-    for axes, each, plane, c in zip(every, lips, planes, cracks, strict=True):
+        v_min, v_max = limits
+    colours = cmap or ("RdBu_r" if v_min < 0 < v_max else "viridis")
+    for axes, lip, plane, c in zip(panels, lips, planes, cracks, strict=True):
         junctions = junction_lines(solution, c)
-        _map(figure, axes, each, junctions, plane, field, (low, high), colours)
+        _map(figure, axes, lip, junctions, plane, field, (v_min, v_max), colours)
         if len(solution.lips) > 1:
             axes.set_title(f"crack {c}", fontsize="medium", loc="left")
     if title:
@@ -330,7 +329,7 @@ def _map(
             PolyCollection(parts, facecolors=color, edgecolors=color, linewidths=0.3)
         )
         axes.plot([], [], "s", color=color, label=label)
-    junction = [on_plane(other.points, plane)[edges] for other, edges in junctions]
+    junction = [on_plane(lip.points, plane)[edges] for lip, edges in junctions]
     for segments, line, width, name in (
         (x[lips.mouth], "black", 1.2, "mouth"),
         (np.concatenate([np.zeros((0, 2, 2)), *junction]), "#7b3294", 1.8, "junction"),

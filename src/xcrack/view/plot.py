@@ -301,9 +301,9 @@ def crack_box(solution: Solution, cracks: list[int], zoom: float, warp: float = 
     x = np.concatenate([solution.lips[c].x for c in cracks])
     if warp:
         x = x + 0.5 * warp * (solution.displacement(x, 1) + solution.displacement(x, -1))
-    low, high = x.min(axis=0), x.max(axis=0)
-    half = zoom * max(float((high - low).max()), 1e-300) / 2
-    middle = (low + high) / 2
+    x_min, x_max = x.min(axis=0), x.max(axis=0)
+    half = zoom * max(float((x_max - x_min).max()), 1e-300) / 2
+    middle = (x_min + x_max) / 2
     return np.stack([middle - half, middle + half])
 
 

@@ -55,10 +55,10 @@ def given_plane(
         origin, axes = value
         x, directions = numbers(origin, "origin", (3,)), numbers(axes, "directions", (2, 3))
         lengths = np.linalg.norm(directions, axis=1, keepdims=True)
-        right_axis, second = directions / np.where(
+        right_axis, up_direction = directions / np.where(
             (lengths > 0) & np.isfinite(lengths), lengths, np.inf
         )
-        up = second - (second @ right_axis) * right_axis
+        up = up_direction - (up_direction @ right_axis) * right_axis
         length = float(np.linalg.norm(up))
         if length > 1e-6 and right_axis.any():
             return Projection(lock(np.array(x)), lock(np.stack([right_axis, up / length])))

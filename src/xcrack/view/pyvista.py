@@ -54,8 +54,8 @@ def draw(
 ) -> Any:
     """Draw a scene; returns the plotter where there is no file."""
     pv = require_package("pyvista", 'plot(renderer="pyvista")')
-    low, high = picture.box
-    size = high - low
+    x_min, x_max = picture.box
+    size = x_max - x_min
     scale = LONGER / float(size.max())
     top = 70 if title else 0
     width = int(size[0] * scale) + 2 * MARGIN + BAR
@@ -71,8 +71,8 @@ def draw(
         camera = plotter.camera
         camera.parallel_projection = True
         # The body fills the window but for the bar on the right and the title above.
-        x = low[0] + (width / 2 - MARGIN) / scale
-        y = (low[1] + high[1]) / 2 + top / 2 / scale
+        x = x_min[0] + (width / 2 - MARGIN) / scale
+        y = (x_min[1] + x_max[1]) / 2 + top / 2 / scale
         far_distance = float(size.max())
         camera.focal_point, camera.position = (x, y, 0.0), (x, y, far_distance)
         camera.parallel_scale = height / 2 / scale
@@ -189,17 +189,17 @@ def _add_lines(pv: Any, plotter: Any, picture: Scene, edges: bool, step: float) 
             plotter.add_mesh(line, color=color, line_width=width, lighting=False)
 
 
-def _ticks(low: float, high: float) -> Floats:
-    """Round numbers from low to high: steps of 1, 2 or 5 times a power of ten.
+def _ticks(x_min: float, x_max: float) -> Floats:
+    """Round numbers from x_min to x_max: steps of 1, 2 or 5 times a power of ten.
 
     >>> _ticks(-0.3, 1.0).round(3).tolist()
     [-0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
     """
-    raw_step = (high - low) / 7
+    raw_step = (x_max - x_min) / 7
     unit = 10.0 ** np.floor(np.log10(raw_step))
     step = unit * next(k for k in (1, 2, 5, 10) if k * unit >= raw_step * (1 - 1e-9))
-    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
-    return np.asarray(step * np.arange(first, last + 1) + 0.0)  # + 0.0: no "-0"
+    first_tick, last_tick = np.ceil(x_min / step - 1e-9), np.floor(x_max / step + 1e-9)
+    return np.asarray(step * np.arange(first_tick, last_tick + 1) + 0.0)  # + 0.0: no "-0"
 
 
 @contextlib.contextmanager
@@ -257,13 +257,13 @@ def draw_space(
     if arrows is not None:
         box = np.concatenate([box, arrows[0], arrows[0] + arrows[1]])
     corners_in_view = box @ np.stack([right_axis, up, viewer], axis=1)
-    low, high = corners_in_view.min(axis=0), corners_in_view.max(axis=0)
-    size = high - low
+    x_min, x_max = corners_in_view.min(axis=0), corners_in_view.max(axis=0)
+    size = x_max - x_min
     extent = float(size[:2].max())
     scale = LONGER / extent
-    if float((picture.body @ right_axis).max()) > high[0]:
+    if float((picture.body @ right_axis).max()) > x_max[0]:
         # What lies beyond the box would be drawn under the bar of the colours.
-        picture = _left_of(picture, right_axis, float(high[0]) + MARGIN / scale)
+        picture = _left_of(picture, right_axis, float(x_max[0]) + MARGIN / scale)
     top = 70 if title else 0
     bar = BAR if picture.label or _legend(picture) else _TRIAD
     width = max(int(size[0] * scale) + 2 * MARGIN, SHORTEST) + bar
@@ -285,8 +285,8 @@ def draw_space(
         camera = plotter.camera
         camera.parallel_projection = True
         # The body fills the window but for the bar on the right and the title above.
-        x = (low[0] + high[0]) / 2 + bar / 2 / scale
-        y = (low[1] + high[1]) / 2 + top / 2 / scale
+        x = (x_min[0] + x_max[0]) / 2 + bar / 2 / scale
+        y = (x_min[1] + x_max[1]) / 2 + top / 2 / scale
         # From close by, too, the whole body lies before the camera.
         depth = picture.body @ viewer
         far_distance = extent + float(depth.max() - depth.min())

@@ -106,12 +106,12 @@ def _warp(solution: Solution) -> float:
 
 def _most_severe(solutions: Sequence[Solution], sif: Sequence[Sequence[SIF]]) -> int:
     """The state with the largest K; the one with most energy where there is none."""
-    largest = [
+    severities = [
         max((float(np.abs(s.K).max(initial=0.0)) for s in state), default=0.0) for state in sif
     ]
-    if not any(largest):
-        largest = [solution.energy for solution in solutions]
-    return int(np.argmax(largest))
+    if not any(severities):
+        severities = [solution.energy for solution in solutions]
+    return int(np.argmax(severities))
 
 
 def _along_fronts(sif: Sequence[Sequence[SIF]]) -> Iterator[tuple[str, Draw]]:

@@ -75,11 +75,11 @@ def _row(sif: SIF, is_of_tip: Any, dim: int) -> tuple[tuple[str, ...], tuple[Any
 
 def _at_tip(sif: SIF, is_of_tip: Any, quality: Any) -> tuple[tuple[str, ...], tuple[Any, ...]]:
     K, is_closed = sif.K[is_of_tip][0], bool(sif.closed[is_of_tip].any())
-    best, bar = sif.best[is_of_tip][0], sif.bar[is_of_tip][0]
+    best_K, bar = sif.best[is_of_tip][0], sif.bar[is_of_tip][0]
     place = coordinates(sif.x[is_of_tip][0])
     head = ("place", "K_I", "K_II", "T", "best K_I", "± K_I", "best K_II", "± K_II", "spread",
             "domain", "closed")  # fmt: skip
-    bars = (best[0], bar[0], best[1], bar[1])
+    bars = (best_K[0], bar[0], best_K[1], bar[1])
     return head, (place, K[0], K[1], sif.T[is_of_tip][0], *bars, *quality, is_closed)
 
 
@@ -122,7 +122,7 @@ def contact(source: Source) -> Section | None:
     for k, solution in enumerate(source.solutions):
         for c, lips in enumerate(solution.lips):
             gap, contact_of_crack = solution.opening(c), solution.contact[c]
-            share, force, largest = 0.0, 0.0, 0.0
+            share, force, p_max = 0.0, 0.0, 0.0
             if contact_of_crack is not None:
                 total = float(contact_of_crack.measure.sum())
                 share = (
@@ -131,10 +131,10 @@ def contact(source: Source) -> Section | None:
                     else 0.0
                 )
                 force = float(contact_of_crack.measure @ contact_of_crack.pressure)
-                largest = float(contact_of_crack.pressure.max(initial=0.0))
-            low = float(gap.min(initial=np.inf)) if len(lips) else 0.0
-            rows.append((k, solution.state, c, contact_of_crack is not None, share, largest, force,
-                         float(gap.max(initial=0.0)), low,
+                p_max = float(contact_of_crack.pressure.max(initial=0.0))
+            least_gap = float(gap.min(initial=np.inf)) if len(lips) else 0.0
+            rows.append((k, solution.state, c, contact_of_crack is not None, share, p_max, force,
+                         float(gap.max(initial=0.0)), least_gap,
                          *_friction_values(solution, contact_of_crack)))  # fmt: skip
     if not rows:
         return None
@@ -172,7 +172,7 @@ def growth(source: Source) -> Section | None:
     if not history.steps:
         return Section("growth", "Growth", element("p", "No step is finished yet.", cls="bad"),
                        {"steps": 0, "ended": history.ended})  # fmt: skip
-    last = history.steps[-1]
+    last_step = history.steps[-1]
     rates = [r for step in history.steps for part in step.rate for r in part if np.isfinite(r)]
     ranges = [r for step in history.steps for part in step.dK_eq for r in part]
     rows: list[tuple[str, Any]] = [
@@ -182,7 +182,7 @@ def growth(source: Source) -> Section | None:
         *(("join", str(join)) for join in history.joins),
         ("why it ended", history.ended),
     ]
-    rows += [("break-through", str(each)) for each in history.arrivals]
+    rows += [("break-through", str(arrival)) for arrival in history.arrivals]
     if rates and ranges:
         units = source.units
         rate = f"{min(rates):.4g} to {max(rates):.4g}"
@@ -193,7 +193,7 @@ def growth(source: Source) -> Section | None:
     law = {k: v for k, v in history.settings.items() if k == "law" or k.startswith("law.")}
     rows += [(name, setting_words(text)) for name, text in law.items() if text != "None"]
     rows += [(f"size of crack {c} at the end", source.units.value(v, LENGTH))
-             for c, v in enumerate(last.sizes)]  # fmt: skip
+             for c, v in enumerate(last_step.sizes)]  # fmt: skip
     parts: list[Any] = [table((), rows)]
     if not source.is_whole:
         words = "This run is not finished: the report shows the steps that are there."
@@ -217,7 +217,7 @@ def lives(source: Source) -> Section | None:
     drivers = sorted(life.scatter.items(), key=lambda item: item[1][0] - item[1][1])
     parts: list[Any] = [table((), [(f"life of the run, {life.unit}s", life.life), *quantiles])]
     if drivers:
-        rows = [(name, low, high, high / low) for name, (low, high) in drivers]
+        rows = [(name, N_min, N_max, N_max / N_min) for name, (N_min, N_max) in drivers]
         head = ("what varies alone", "5 %", "95 %", "ratio")
         parts += [element("h3", "What drives it"), table(head, rows)]
     if life.bounds:
@@ -288,15 +288,15 @@ def spectrum(source: Source) -> Section | None:
     if history is None or history.settings.get("cycle") != "Spectrum":
         return None
     steps, settings, unit = history.steps, history.settings, history.unit
-    last = steps[-1]
+    last_step = steps[-1]
     rows: list[tuple[str, Any]] = [
         ("one repetition", unit),
-        ("repetitions at the last step", last.cycles),
+        ("repetitions at the last step", last_step.cycles),
     ]
     rows += _rows(settings, "cycle.", other_keys=("cycle.unit",))
     counts = [len(step.levels) for step in steps if step.levels]
     if counts:
-        levels = last.levels
+        levels = last_step.levels
         rows += [("levels of K a step", f"{min(counts)} to {max(counts)}"),
                  ("their factors", f"{min(levels):.6g} to {max(levels):.6g}"),
                  ("largest range", max(levels) - min(levels))]  # fmt: skip
@@ -305,12 +305,13 @@ def spectrum(source: Source) -> Section | None:
     if drawn_spectrum is not None and drawn_spectrum.states is None:
         words = f"Load history: a {drawn_spectrum.unit} in time, and how often a range is exceeded"
         parts.append(drawn_figure(words, lambda file: plot_spectrum(drawn_spectrum, file=file)))
-    values: dict[str, Any] = {"unit": unit, "blocks": last.cycles, "levels": list(last.levels)}
+    values: dict[str, Any] = {"unit": unit, "blocks": last_step.cycles}
+    values["levels"] = list(last_step.levels)
     model = settings.get("retardation", "None")
     if model != "None":
         parts += [element("h3", "Retardation"),
                   table((), [("model", model), *_rows(settings, "retardation.")])]  # fmt: skip
-        zones_left = _zones_of_cracks(last)
+        zones_left = _zones_of_cracks(last_step)
         head = ("crack", "places", "K of the overload", "its zone", "growth since")
         parts += [
             element("p", "What overloads have left at the last step:"),
@@ -346,8 +347,8 @@ def _ranges(zones: OverloadZones) -> tuple[str, ...]:
 
 
 def _range(x: Any) -> str:
-    low, high = float(x.min()), float(x.max())
-    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+    x_min, x_max = float(x.min()), float(x.max())
+    return f"{x_min:.4g}" if x_min == x_max else f"{x_min:.4g} to {x_max:.4g}"
 
 
 __all__ = ["contact", "growth", "intensity", "lives", "numbers", "spectrum"]

@@ -44,8 +44,8 @@ def scene(source: Source) -> Section:
         ]
         rows += [("order of the elements", problem.order), ("contact", problem.contact)]
     for c, crack in enumerate(source.cracks):
-        where = "" if problem is None else _materials_of_tips(problem, source.sif, c)
-        rows.append((f"crack {c}", _crack(crack, mesh) + where))
+        tip_materials = "" if problem is None else _materials_of_tips(problem, source.sif, c)
+        rows.append((f"crack {c}", _crack(crack, mesh) + tip_materials))
     parts: list[Any] = [table((), rows)]
     crack_measures = [] if mesh is None else [measures(crack, mesh) for crack in source.cracks]
     if crack_measures:
@@ -95,12 +95,12 @@ def _measures_of_crack(c: int, m: Measures) -> tuple[str, ...]:
 
 def _conditions(solution: Solution, units: UnitNames) -> Markup:
     """Supports and loads, and what they add up to in this state."""
-    rows = [condition_row("support", each, units) for each in solution.problem.supports]
-    rows += [condition_row("load", each, units) for each in solution.loads]
+    rows = [condition_row("support", support, units) for support in solution.problem.supports]
+    rows += [condition_row("load", load, units) for load in solution.loads]
     if not rows:
         return element("p", "No supports and no loads.")
     parts = [table(("", "kind", "where", "value"), rows)]
-    sums = [(each.name, *each.sums_as_text) for each in solution.report.resultants]
+    sums = [(resultant.name, *resultant.sums_as_text) for resultant in solution.report.resultants]
     if sums:
         force, moment = (LINE_FORCE, FORCE) if solution.space.dim == 2 else (FORCE, MOMENT)
         head = ("resultants and reactions", units.head("force", force),
@@ -112,8 +112,8 @@ def _conditions(solution: Solution, units: UnitNames) -> Markup:
 
 def condition_row(role: str, condition: Condition, units: UnitNames) -> tuple[str, str, str, str]:
     """Role, kind, place and values of a support or a load."""
-    where = condition.place
-    place = "" if where is None else where if isinstance(where, str) else _vector(where)
+    location = condition.place
+    place = "" if location is None else location if isinstance(location, str) else _vector(location)
     return role, condition.kind, place, values_in_words(condition, units)
 
 
@@ -147,7 +147,7 @@ def _value(value: Any) -> str:
 def _short_number(value: Any) -> Any:
     """Numbers without the digits that nobody reads."""
     if isinstance(value, list):
-        return [_short_number(each) for each in value]
+        return [_short_number(entry) for entry in value]
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
@@ -179,11 +179,11 @@ def _notes(source: Source) -> list[str]:
         law = history.settings.get("law", "")
         ratios = [R for step in history.steps for R in step.R_range or step.R if len(R)]
         if ratios:
-            every = np.concatenate([R.ravel() for R in ratios])
-            every = every[np.isfinite(every)]
-            if len(every):
+            all_R = np.concatenate([R.ravel() for R in ratios])
+            all_R = all_R[np.isfinite(all_R)]
+            if len(all_R):
                 what = "run" if history.unit == "cycle" else f"cycles of each {history.unit}"
-                notes.append(f"R of the {what} is {every.min():.3g} to {every.max():.3g}: compare "
+                notes.append(f"R of the {what} is {all_R.min():.3g} to {all_R.max():.3g}: compare "
                              "it with the range that the growth law was fitted for.")  # fmt: skip
         program = history.settings.get("load_program", "None")
         if program != "None":

@@ -84,17 +84,17 @@ class UnitNames:
         powers, force = dimension
         if not self.length or (powers, force) == (0.0, 0.0):
             return ""
-        first = {0.0: "", 1.0: self.force}.get(force, f"{self.force}^{force:g}")
+        of_force = {0.0: "", 1.0: self.force}.get(force, f"{self.force}^{force:g}")
         if force == 1 and powers <= -1.5 and (powers, force) != BODY_FORCE:
-            first, powers = self.stress, powers + 2
+            of_force, powers = self.stress, powers + 2
         if powers == 0:
-            return first
+            return of_force
         size = {1.0: "", 2.0: "²", 3.0: "³", 0.5: ""}.get(abs(powers), f"^{abs(powers):g}")
         root = "√" if abs(powers) == 0.5 else ""
-        last = f"{root}{self.length}{size}"
+        of_length = f"{root}{self.length}{size}"
         if powers < 0:
-            return f"{first or '1'}/{last}"
-        return f"{first}·{last}" if first and not root else f"{first}{last}"
+            return f"{of_force or '1'}/{of_length}"
+        return f"{of_force}·{of_length}" if of_force and not root else f"{of_force}{of_length}"
 
     def value(self, value: Any, dimension: Dimension) -> str:
         """A value with its unit."""
@@ -274,8 +274,8 @@ def _of_history(history: History, title: str, yield_stress: float | None) -> Sou
     solutions: tuple[Solution, ...] = ()
     sif: tuple[tuple[SIF, ...], ...] = ()
     if history.steps:
-        last = (history.solved or history.steps)[-1]
-        solutions, sif = last.solutions, last.sif
+        last_step = (history.solved or history.steps)[-1]
+        solutions, sif = last_step.solutions, last_step.sif
         for step in history.steps:
             if step.warnings is None:  # of a script, or of an older xcrack
                 _sif(step.solutions)  # what is warned of is what counts here

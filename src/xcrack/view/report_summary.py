@@ -130,23 +130,23 @@ def _margins(source: Source) -> Rows:
     units, history = source.units, source.history
     nu = source.nu
     if history is not None and history.solved:
-        first, last = (max(K_of_cracks(history.solved[k], nu), default=0.0) for k in (0, -1))
-        yield "largest K at first", units.value(f"{first:.5g}", TOUGHNESS)
-        yield "largest K at the end", units.value(f"{last:.5g}", TOUGHNESS)
+        first_K, last_K = (max(K_of_cracks(history.solved[k], nu), default=0.0) for k in (0, -1))
+        yield "largest K at first", units.value(f"{first_K:.5g}", TOUGHNESS)
+        yield "largest K at the end", units.value(f"{last_K:.5g}", TOUGHNESS)
     else:
         for k, state in enumerate(source.sif):
             for c, sif in enumerate(state):
                 if len(sif.K):
-                    where = f", state {k}" if len(source.sif) > 1 else ""
-                    yield f"K of crack {c}{where}", _largest_K(sif, source)
-        last = np.nan if source.validity is None else source.validity.K
+                    state_text = f", state {k}" if len(source.sif) > 1 else ""
+                    yield f"K of crack {c}{state_text}", _largest_K(sif, source)
+        last_K = np.nan if source.validity is None else source.validity.K
     for handbook_case in (
         () if source.problem is None or history is not None else source.problem.handbook
     ):
         yield "beside a handbook", handbook_case.comparison(source.solutions[-1])
     K_c = source.toughness
-    if K_c is not None and last > 0:
-        yield "margin of toughness", _verdict(f"K_c / K = {K_c / last:.4g}", K_c > last)
+    if K_c is not None and last_K > 0:
+        yield "margin of toughness", _verdict(f"K_c / K = {K_c / last_K:.4g}", K_c > last_K)
     known_validity = source.validity
     if known_validity is None or np.isnan(known_validity.zone):
         yield "plastic zone, net section", "not judged: no yield stress is known"

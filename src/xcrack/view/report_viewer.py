@@ -172,11 +172,11 @@ def packed_layers(layers: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     if not layers or triangles > MOST:
         return None
     corners = np.concatenate([layer["corners"].reshape(-1, 3) for layer in layers])
-    low = corners.min(axis=0)
+    x_min = corners.min(axis=0)
     extent = float(np.ptp(corners, axis=0).max()) or 1.0
     content = []
     for layer in layers:
-        share = (layer["corners"].reshape(-1, 3) - low) / extent
+        share = (layer["corners"].reshape(-1, 3) - x_min) / extent
         places = np.round(share * 65535).astype("<u2")
         colours = np.asarray(layer["colours"], dtype=np.uint8)
         if colours.ndim == 1:
@@ -211,8 +211,8 @@ def _body(mesh: Mesh) -> list[dict[str, Any]]:
 def _coloured_layer(values: Floats, limits: tuple[float, float]) -> Any:
     from matplotlib import colormaps
 
-    low, high = limits
-    share = np.clip((values.ravel() - low) / ((high - low) or 1.0), 0, 1)
+    v_min, v_max = limits
+    share = np.clip((values.ravel() - v_min) / ((v_max - v_min) or 1.0), 0, 1)
     return np.asarray(255 * colormaps["viridis"](share)[:, :3], dtype=np.uint8)
 
 

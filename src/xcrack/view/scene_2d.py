@@ -87,7 +87,7 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
     """Field on the moved body, each piece with its own side of the crack."""
     body = pieces(solution)
     values = field_values(body, field)
-    low, high, share = _range(body, field, values, limits)
+    v_min, v_max, share = _range(body, field, values, limits)
     # Rounded down: "100 %" would not be true.
     label = label_of(body, field)
     label += f", clipped at {int(10 * share) / 10:g} %" if share < 100 else ""
@@ -117,12 +117,12 @@ def scene(solution: Solution, field: str, warp: float, limits: tuple[float, floa
         triangles=triangles,
         values=values,
         label=label,
-        limits=(low, high),
+        limits=(v_min, v_max),
         is_beyond=(
-            bool(values.min() < low - 1e-9 * (high - low)),
-            bool(values.max() > high + 1e-9 * (high - low)),
+            bool(values.min() < v_min - 1e-9 * (v_max - v_min)),
+            bool(values.max() > v_max + 1e-9 * (v_max - v_min)),
         ),
-        has_sign=low < 0 < high,
+        has_sign=v_min < 0 < v_max,
         outline=outline,
         lips=curve[lip & ~is_closed],
         closed_lips=curve[lip & is_closed],
@@ -165,8 +165,8 @@ def _curved_triangles(
     """Points, values and triangles, those beside a curved edge in parts that follow it."""
     edges = curved_sides.facets_of_edges(triangles, lines, facet)
     is_beside = (edges >= 0).any(axis=1)
-    chosen = triangles[is_beside]
-    x, data = curved_sides.bend_edges(points[chosen], edges[is_beside], point_data[chosen])
+    corners = triangles[is_beside]
+    x, data = curved_sides.bend_edges(points[corners], edges[is_beside], point_data[corners])
     number = len(points) + np.arange(3 * len(x)).reshape(-1, 3)
     return (
         np.concatenate([points, x.reshape(-1, 2)]),
@@ -211,13 +211,13 @@ def _range(
         return float(limits[0]), float(limits[1]), 100.0
     if field in STRESSES and body.solution.space.tips:
         regular_values = values[body.corners[~body.solution.space.has_tip[body.cell]]]
-        low, high, share = clipped_range(
+        v_min, v_max, share = clipped_range(
             values[body.corners], body.volume, float(np.abs(regular_values).max(initial=0.0))
         )
-        low, high = max(low, float(values.min())), min(high, float(values.max()))
+        v_min, v_max = max(v_min, float(values.min())), min(v_max, float(values.max()))
     else:
-        low, high, share = float(values.min()), float(values.max()), 100.0
-    return *rounded_range(low, high, field), share
+        v_min, v_max, share = float(values.min()), float(values.max()), 100.0
+    return *rounded_range(v_min, v_max, field), share
 
 
 def clipped_range(
@@ -235,31 +235,31 @@ def clipped_range(
     regular_limit : float
         Values up to this size are kept at any rate.
     """
-    low, high = float(values.min()), float(values.max())
+    v_min, v_max = float(values.min()), float(values.max())
     size = np.abs(values)
     order = np.argsort(size, axis=None)
     area = np.cumsum(np.repeat(measure / size.shape[1], size.shape[1])[order])
     size_sorted = size.ravel()[order]
     limit = size_sorted[min(np.searchsorted(area, _SHARE / 100 * area[-1]), len(area) - 1)]
     top = max(regular_limit, float(limit))
-    if max(-low, high) <= top:
-        return low, high, 100.0
+    if max(-v_min, v_max) <= top:
+        return v_min, v_max, 100.0
     last_shown = np.searchsorted(size_sorted, top, side="right") - 1
-    return max(low, -top), min(high, top), 100 * float(area[last_shown] / area[-1])
+    return max(v_min, -top), min(v_max, top), 100 * float(area[last_shown] / area[-1])
 
 
-def rounded_range(low: float, high: float, field: str) -> tuple[float, float]:
-    """Ends of the colours for values from low to high."""
-    if low < 0 < high and min(-low, high) > 0.05 * max(-low, high):
-        high = max(-low, high)
-        low = -high
+def rounded_range(v_min: float, v_max: float, field: str) -> tuple[float, float]:
+    """Ends of the colours for values from v_min to v_max."""
+    if v_min < 0 < v_max and min(-v_min, v_max) > 0.05 * max(-v_min, v_max):
+        v_max = max(-v_min, v_max)
+        v_min = -v_max
     if field in ("von_mises", "displacement"):
-        low = 0.0
-    if high - low <= 1e-6 * max(abs(low), abs(high)):
+        v_min = 0.0
+    if v_max - v_min <= 1e-6 * max(abs(v_min), abs(v_max)):
         # One value everywhere: noise should not be spread over all the colours.
-        middle, reach = (low + high) / 2, 0.05 * max(abs(low), abs(high), 1e-300)
-        low, high = middle - reach, middle + reach
-    return low, high
+        middle, reach = (v_min + v_max) / 2, 0.05 * max(abs(v_min), abs(v_max), 1e-300)
+        v_min, v_max = middle - reach, middle + reach
+    return v_min, v_max
 
 
 def _triangles(body: Pieces) -> Ints:
@@ -288,8 +288,8 @@ def _edges(body: Pieces) -> tuple[Ints, Ints]:
     order = np.lexsort((edge[:, 2], ends[:, 1], ends[:, 0]))
     ends = ends[order]
     # The last of a group knows the midpoint if any does.
-    last = np.append((ends[1:] != ends[:-1]).any(axis=1), True)
-    return edge[order][last], owner[order][last]
+    is_last = np.append((ends[1:] != ends[:-1]).any(axis=1), True)
+    return edge[order][is_last], owner[order][is_last]
 
 
 def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints, Bools]:
@@ -302,12 +302,12 @@ def _on_facets(body: Pieces, edge: Ints, owner: Ints) -> tuple[Bools, Ints, Bool
     a, b = (barycentric(mesh, cell, body.points[edge[:, k]]) for k in (0, 1))
     on = (np.abs(a) < _NEAR) & (np.abs(b) < _NEAR)
     rim = mesh.facet_to_cell[mesh.cell_to_facet, 1] < 0  # opposite to each corner of a cell
-    outer = on & rim[cell]
-    facet = mesh.cell_to_facet[cell, np.argmax(outer, axis=1)]
+    rims = on & rim[cell]
+    facet = mesh.cell_to_facet[cell, np.argmax(rims, axis=1)]
     is_interface = np.zeros(len(mesh.facets), dtype=bool)
     is_interface[body.solution.problem.elasticity.interfaces] = True
     is_bonded = (on & is_interface[mesh.cell_to_facet[cell]]).any(axis=1)
-    return np.asarray(on.any(axis=1)), np.where(outer.any(axis=1), facet, -1), np.asarray(is_bonded)
+    return np.asarray(on.any(axis=1)), np.where(rims.any(axis=1), facet, -1), np.asarray(is_bonded)
 
 
 def _curves(edge: Ints, points: Floats) -> Floats:
@@ -330,6 +330,6 @@ def _on_lips(body: Pieces, edge: Ints) -> tuple[Ints, Bools]:
         crack[is_on_crack] = c
         contact = body.solution.contact[c]
         if contact is not None and is_on_crack.any():
-            nearest = cKDTree(contact.points).query((a[is_on_crack] + b[is_on_crack]) / 2)[1]
-            is_closed[is_on_crack] = contact.closed[nearest]
+            nearest_points = cKDTree(contact.points).query((a[is_on_crack] + b[is_on_crack]) / 2)[1]
+            is_closed[is_on_crack] = contact.closed[nearest_points]
     return crack, is_closed

@@ -107,11 +107,11 @@ class SpaceScene:
             return body
         parts = (self.triangles, self.closed_faces, self.open_faces)
         x = np.concatenate([part.reshape(-1, 3) for part in parts])
-        low, high = x.min(axis=0), x.max(axis=0)
-        size = float((high - low).max())
+        x_min, x_max = x.min(axis=0), x.max(axis=0)
+        size = float((x_max - x_min).max())
         if size > _CLOSE * float(np.ptp(body, axis=0).max()):
             return body
-        ends = np.stack([low - _AROUND * size, high + _AROUND * size])
+        ends = np.stack([x_min - _AROUND * size, x_max + _AROUND * size])
         return np.stack(np.meshgrid(*ends.T), axis=-1).reshape(-1, 3)
 
     @property
@@ -183,14 +183,14 @@ def space_scene(
             x, data = _curved_parts(curved_sides, on, part, x, data)
         return x, x + warp * data[..., :3], data[..., 3]
 
-    _, corners, values = (np.concatenate(each) for each in zip(*map(place_part, parts)))
+    _, corners, values = (np.concatenate(arrays) for arrays in zip(*map(place_part, parts)))
     if not len(corners):
         raise ProblemError("plot(clip=...): the plane leaves nothing of the body; turn its normal.")
     share = 100.0
-    low, high = float(values.min()), float(values.max())
+    v_min, v_max = float(values.min()), float(values.max())
     if field in STRESSES and solution.space.tips:
-        low, high, share = clipped_range(values, areas(corners))
-    low, high = rounded_range(low, high, field) if limits is None else limits
+        v_min, v_max, share = clipped_range(values, areas(corners))
+    v_min, v_max = rounded_range(v_min, v_max, field) if limits is None else limits
     clip = limits is None and share < 100
     nothing = np.zeros((0, 3, 3))
     curves = [
@@ -202,8 +202,8 @@ def space_scene(
         triangles=corners,
         values=values,
         label=label_of(body, field) + (f", clipped at {int(10 * share) / 10:g} %" if clip else ""),
-        limits=(low, high),
-        has_sign=low < 0 < high,
+        limits=(v_min, v_max),
+        has_sign=v_min < 0 < v_max,
         closed_faces=nothing,
         open_faces=nothing,
         skin=nothing,
@@ -241,9 +241,9 @@ def _on_curve(curved_sides: CurvedSides, on: Faces) -> Ints:
     facet = np.repeat(on.of_shell, 3)
     number = on.shell.ravel()
     order = np.argsort(curved_sides.facet_to_curve[facet] < 0, kind="stable")
-    best = np.full(int(number.max(initial=-1)) + 1, -1)
-    best[number[order[::-1]]] = facet[order[::-1]]
-    return np.asarray(best[number])
+    point_facet = np.full(int(number.max(initial=-1)) + 1, -1)
+    point_facet[number[order[::-1]]] = facet[order[::-1]]
+    return np.asarray(point_facet[number])
 
 
 def crack_scene(
@@ -257,29 +257,29 @@ def crack_scene(
 ) -> SpaceScene:
     """Field on cracks, in a body that is seen through."""
     lips = [lip_faces(solution, c) for c in cracks]
-    corners = np.concatenate([_middle_of_lips(each, warp)[each.triangles] for each in lips])
-    values = np.concatenate([lip_values(each, field) for each in lips])
-    is_in_colour = np.concatenate([is_coloured(each, field) for each in lips])
+    corners = np.concatenate([_middle_of_lips(lip, warp)[lip.triangles] for lip in lips])
+    values = np.concatenate([lip_values(lip, field) for lip in lips])
+    is_in_colour = np.concatenate([is_coloured(lip, field) for lip in lips])
     nothing = np.zeros((0, 3, 3))
-    low, high = (0.0, 1.0)
+    v_min, v_max = (0.0, 1.0)
     if is_in_colour.any():
-        low, high = float(values[is_in_colour].min()), float(values[is_in_colour].max())
+        v_min, v_max = float(values[is_in_colour].min()), float(values[is_in_colour].max())
     # Gaps are closed in the mean of a cell only: near contact some points lie a bit too deep.
-    if field != "pressure" and low > -0.3 * high:
-        low = 0.0
+    if field != "pressure" and v_min > -0.3 * v_max:
+        v_min = 0.0
     if field == "pressure":
-        low = min(low, 0.0)
-    low, high = rounded_range(low, high, field) if limits is None else limits
+        v_min = min(v_min, 0.0)
+    v_min, v_max = rounded_range(v_min, v_max, field) if limits is None else limits
     return replace(
         _seen_through(solution, warp, plane),
         triangles=corners[is_in_colour],
         values=values[is_in_colour],
         label=LIP_FIELDS[field],
-        limits=(low, high),
-        has_sign=low < 0 < high,
+        limits=(v_min, v_max),
+        has_sign=v_min < 0 < v_max,
         closed_faces=nothing if field == "pressure" else corners[~is_in_colour],
         open_faces=corners[~is_in_colour] if field == "pressure" else nothing,
-        rims=np.concatenate([_middle_of_lips(each, warp)[each.mouth] for each in lips]),
+        rims=np.concatenate([_middle_of_lips(lip, warp)[lip.mouth] for lip in lips]),
         cell_edges=edges_of(corners),
         view_direction=_viewing_direction(plane, view, lips),
     )
@@ -289,7 +289,7 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
     """Mesh, cracks and enriched points."""
     space = solution.space
     lips = [lip_faces(solution, c) for c in range(len(space.cuts))]
-    corners = [each.points[each.triangles] for each in lips]
+    corners = [lip.points[lip.triangles] for lip in lips]
     lines_through = _seen_through(solution, 0.0, plane, with_cells=True)
     has_jump = np.zeros(space.n_nodes, dtype=bool)
     for number in space.heaviside:
@@ -297,11 +297,11 @@ def mesh_scene(solution: Solution, plane: Plane | None, view: Floats | None) -> 
     has_tip = np.zeros(space.mesh.n_points, dtype=bool)
     for tip in space.tips:
         has_tip |= tip.point_to_function >= 0
-    every = np.concatenate([np.zeros((0, 3, 3)), *corners])
+    lip_corners = np.concatenate([np.zeros((0, 3, 3)), *corners])
     return replace(
         lines_through,
-        closed_faces=every,
-        cell_edges=edges_of(every),
+        closed_faces=lip_corners,
+        cell_edges=edges_of(lip_corners),
         view_direction=_viewing_direction(plane, view, lips),
         heaviside=space.node_points[has_jump],
         tip=space.mesh.points[has_tip],
@@ -316,11 +316,11 @@ def _seen_through(
     displacement = solution.coefficients[: mesh.n_points]
     curved_sides = CurvedSides.of(mesh)
     level = levels(mesh.points, plane)
-    facets, outer = mesh.boundary, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    facets, outer_facets = mesh.boundary, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
     edges, facet, is_sharp = boundary_edges(mesh, curved_sides)
     sharp_lines = segments_behind(edges[is_sharp], level, facet[is_sharp])
     if plane is not None:
-        sharp_lines += crossing(facets, level, outer)
+        sharp_lines += crossing(facets, level, outer_facets)
 
     def place_part(part: TriangleSoup) -> Floats:
         x, data = part.at(mesh.points), part.at(displacement)
@@ -328,7 +328,7 @@ def _seen_through(
             x, data, _ = curved_sides.bend(x, part.facet, data)
         return x + warp * data
 
-    skin = place_part(TriangleSoup.of(facets, None, outer).part_behind(level))
+    skin = place_part(TriangleSoup.of(facets, None, outer_facets).part_behind(level))
     faint_lines = [place_part(part) for part in segments_behind(edges, level, facet)]
     no_lines = np.zeros((0, 2, 3))
     outline = np.concatenate([place_part(part) for part in sharp_lines] or [no_lines])
@@ -375,8 +375,8 @@ def _middle_of_lips(lips: LipFaces, warp: float) -> Floats:
 
 
 def _front_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats:
-    every = [lip_faces(solution, c) for c in range(len(solution.lips))]
-    return _lines_behind([(lips, lips.front) for lips in every], warp, plane)
+    all_lips = [lip_faces(solution, c) for c in range(len(solution.lips))]
+    return _lines_behind([(lips, lips.front) for lips in all_lips], warp, plane)
 
 
 def _junction_lines(solution: Solution, warp: float, plane: Plane | None) -> Floats:
@@ -403,7 +403,7 @@ def _viewing_direction(
         direction = plane[1]
     elif lips:
         direction = np.sum(
-            [(each.area[:, None] * _face_normals(each)).sum(axis=0) for each in lips], 0
+            [(lip.area[:, None] * _face_normals(lip)).sum(axis=0) for lip in lips], 0
         )
         length = float(np.linalg.norm(direction))
         direction = direction / length if length else usual_direction
@@ -462,8 +462,8 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
         if np.ptp(x, axis=0).max() < _SMALL * mesh.extent:
             forces.append(np.stack([middle, area @ t, area @ outward_normal])[None])
         else:
-            chosen = _distant_points(x, _MANY)
-            tractions.append(np.stack([x, t, outward_normal], axis=1)[chosen])
+            arrow_points = _distant_points(x, _MANY)
+            tractions.append(np.stack([x, t, outward_normal], axis=1)[arrow_points])
     start, vector = [], []
     for group in (np.concatenate(forces), np.concatenate(tractions)):
         size = np.linalg.norm(group[:, 1], axis=1)
@@ -482,19 +482,19 @@ def _area_vectors(mesh: Mesh, facets: Ints) -> Floats:
     normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2
     key = {tuple(f): i for i, f in enumerate(np.sort(mesh.facets, axis=1).tolist())}
     number = np.array([key[tuple(f)] for f in np.sort(facets, axis=1).tolist()], dtype=np.int64)
-    inner = mesh.points[mesh.cells[mesh.facet_to_cell[number, 0]]].mean(axis=1)
-    sign = np.sign(np.einsum("kd,kd->k", normal, x.mean(axis=1) - inner))
+    cell_middle = mesh.points[mesh.cells[mesh.facet_to_cell[number, 0]]].mean(axis=1)
+    sign = np.sign(np.einsum("kd,kd->k", normal, x.mean(axis=1) - cell_middle))
     return np.asarray(sign[:, None] * normal)
 
 
 def _distant_points(x: Floats, n: int) -> Ints:
     """Up to n points far from each other, by their numbers."""
-    chosen = [int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
-    distance = np.linalg.norm(x - x[chosen[0]], axis=1)
-    while len(chosen) < min(n, len(x)):
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(x - x[chosen[-1]], axis=1))
-    return np.array(chosen)
+    rows = [int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
+    distance = np.linalg.norm(x - x[rows[0]], axis=1)
+    while len(rows) < min(n, len(x)):
+        rows.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(x - x[rows[-1]], axis=1))
+    return np.array(rows)
 
 
 __all__ = [

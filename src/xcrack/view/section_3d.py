@@ -66,11 +66,11 @@ class TriangleSoup:
         if level is None:
             return self
         values = level[self.number]
-        low, high = values.min(axis=1), values.max(axis=1)
+        level_min, level_max = values.min(axis=1), values.max(axis=1)
         # The section has what lies in the plane, on the side that is drawn: lips lie there twice.
         whole_rows, split = (
-            np.nonzero((high <= 0) & (low < 0))[0],
-            np.nonzero((low < 0) & (high > 0))[0],
+            np.nonzero((level_max <= 0) & (level_min < 0))[0],
+            np.nonzero((level_min < 0) & (level_max > 0))[0],
         )
         bary, _, side, parent = cut_simplices(values[split])
         is_behind = side < 0
@@ -203,8 +203,8 @@ def faces(body: Pieces, curved_sides: CurvedSides | None) -> Faces:
                 mouth = is_on_lip & (is_zero_side & rim[cell]).any(axis=1)
                 for k, rows in enumerate((is_outside & feature, mouth, is_outside & edge)):
                     lines[k].append(_halves(block[rows], a, b))
-                    each = len(lines[k][-1]) // max(int(rows.sum()), 1)
-                    of_lines[k].append(np.tile(facet[rows], each))
+                    n_lines = len(lines[k][-1]) // max(int(rows.sum()), 1)
+                    of_lines[k].append(np.tile(facet[rows], n_lines))
     shell, lip = (np.concatenate(group) for group in groups)
     outline, rims, cells = (
         unique_segments(np.concatenate(line), np.concatenate(facet), curved_sides)
@@ -294,8 +294,8 @@ def sharp_edges(mesh: Mesh, curved_sides: CurvedSides | None) -> Bools:
     is_sharp = turn < _SHARP
     if curved_sides is not None:
         side = curved_sides.facet_to_curve[mesh.facet_to_cell[:, 1] < 0]
-        one, other = side[owner[same_edge]], side[owner[same_edge + 1]]
-        is_sharp &= (one != other) | (one < 0)
+        first_curve, second_curve = side[owner[same_edge]], side[owner[same_edge + 1]]
+        is_sharp &= (first_curve != second_curve) | (first_curve < 0)
     sharp_keys = np.unique(key[order][same_edge[is_sharp]])
     edges = np.sort(mesh.edges, axis=1)
     return np.isin(edges[:, 0] * mesh.n_points + edges[:, 1], sharp_keys)
@@ -303,9 +303,9 @@ def sharp_edges(mesh: Mesh, curved_sides: CurvedSides | None) -> Bools:
 
 def boundary_edges(mesh: Mesh, curved_sides: CurvedSides | None) -> tuple[Ints, Ints, Bools]:
     """Edges of the boundary `(e, 2)`, the facet on which each lies, and which are sharp."""
-    outer = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
-    pairs = mesh.facets[outer][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    edges, facet = unique_segments(pairs, np.repeat(outer, 3), curved_sides)
+    outer_facets = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0]
+    pairs = mesh.facets[outer_facets][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    edges, facet = unique_segments(pairs, np.repeat(outer_facets, 3), curved_sides)
     sharp_pairs = np.sort(mesh.edges[sharp_edges(mesh, curved_sides)], axis=1)
     key, of_sharp = (pair[:, 0] * mesh.n_points + pair[:, 1] for pair in (edges, sharp_pairs))
     return edges, facet, np.isin(key, of_sharp)

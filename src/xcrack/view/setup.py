@@ -58,16 +58,16 @@ def _size(mesh: Mesh) -> tuple[float, float]:
 def _draw_body(axes: Any, mesh: Mesh) -> None:
     lines = boundary_lines(mesh) if mesh.dim == 2 else _edges(mesh)
     axes.add_collection(_lines(lines, "black", 1.0, mesh.dim))
-    low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
+    x_min, x_max = mesh.points.min(axis=0), mesh.points.max(axis=0)
     margin = (1.5 * _ARROW if mesh.dim == 2 else 0.5 * _ARROW) * mesh.extent
     names = "xyz"[: mesh.dim]
-    axes.set(**{f"{name}lim": (a - margin, b + margin) for name, a, b in zip(names, low, high)},
+    axes.set(**{f"{name}lim": (a - margin, b + margin) for name, a, b in zip(names, x_min, x_max)},
              **{f"{name}label": name for name in names})  # fmt: skip
     if mesh.dim == 2:
         axes.set_aspect("equal")
         axes.spines[["top", "right"]].set_visible(False)
     else:
-        axes.set_box_aspect(high - low + 2 * margin)
+        axes.set_box_aspect(x_max - x_min + 2 * margin)
         axes.grid(False)
 
 
@@ -158,21 +158,21 @@ def _sides(mesh: Mesh, facets: Ints) -> tuple[Floats, Floats, Floats]:
         normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) / 2
     key = {tuple(f): i for i, f in enumerate(np.sort(mesh.facets, axis=1).tolist())}
     number = np.array([key[tuple(f)] for f in np.sort(facets, axis=1).tolist()], dtype=np.int64)
-    inner = mesh.points[mesh.cells[mesh.facet_to_cell[number, 0]]].mean(axis=1)
+    cell_middle = mesh.points[mesh.cells[mesh.facet_to_cell[number, 0]]].mean(axis=1)
     middle = x.mean(axis=1)
-    normal = normal * np.sign(np.einsum("kd,kd->k", normal, middle - inner))[:, None]
+    normal = normal * np.sign(np.einsum("kd,kd->k", normal, middle - cell_middle))[:, None]
     size = np.linalg.norm(normal, axis=1)
     return middle, normal / size[:, None], size
 
 
 def _spread(x: Floats, n: int) -> Ints:
     """Up to n points, each far from those before it."""
-    chosen = [int(np.argmin(x @ np.linspace(1.0, 0.9, x.shape[1])))]
-    distance = np.linalg.norm(x - x[chosen[0]], axis=1)
-    while len(chosen) < min(n, len(x)):
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(x - x[chosen[-1]], axis=1))
-    return np.array(chosen)
+    rows = [int(np.argmin(x @ np.linspace(1.0, 0.9, x.shape[1])))]
+    distance = np.linalg.norm(x - x[rows[0]], axis=1)
+    while len(rows) < min(n, len(x)):
+        rows.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(x - x[rows[-1]], axis=1))
+    return np.array(rows)
 
 
 # Supports, cracks, sets.
