@@ -179,8 +179,8 @@ def warn_of(
     for solution, part in zip(solutions, parts, strict=True):
         error_of_K = np.abs(part.eta) + part.bar
         error_of_K[part.closed, 0] = 0.0  # K_I is exact there
-        largest = float(np.abs(part.K).max(initial=0.0))
-        scale = max(largest, _NOTHING * _K_of_mean_stress(solution, part, radius))
+        largest_K = float(np.abs(part.K).max(initial=0.0))
+        scale = max(largest_K, _NOTHING * _K_of_mean_stress(solution, part, radius))
         if not error_of_K.size or error_of_K.max() <= largest_error * scale:
             continue
         largest_error = float(error_of_K.max()) / scale
@@ -272,11 +272,11 @@ def _difference(
     for part, scale in zip(parts, scales, strict=True):
         spread = np.array(part.spread)
         spread[part.closed, 0] = 0.0  # K_I is exact there
-        inner = ~part.at_surface if not part.at_surface.all() else part.at_surface
-        difference = float(spread[inner].mean(axis=0).max())
+        is_inside = ~part.at_surface if not part.at_surface.all() else part.at_surface
+        difference = float(spread[is_inside].mean(axis=0).max())
         if scale > 0 and difference / scale > largest_difference:
             largest_difference = difference / scale
-            place = part.x[inner][np.argmax(spread[inner].max(axis=1))]
+            place = part.x[is_inside][np.argmax(spread[is_inside].max(axis=1))]
             text = (
                 f"domains of radius {domain.outer_radius:.4g} and less differ by {difference:.3g}, "
                 f"{100 * largest_difference:.2g} % of the largest K"

@@ -14,7 +14,7 @@ from xcrack.model.material import Isotropic
 from xcrack.sif.sif import SIF
 
 
-def weight(r: Floats, xi: Floats, inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
+def weight(r: Floats, xi: Floats, r_inner: Floats, r_outer: Floats) -> tuple[Floats, Floats]:
     """Weight q of a domain integral, one inside and zero outside by a quintic, and its gradient.
 
     Parameters
@@ -23,7 +23,7 @@ def weight(r: Floats, xi: Floats, inner: Floats, outer: Floats) -> tuple[Floats,
         Distance to the tip.
     xi : (q, d) array, length
         Places from the tip.
-    inner, outer : (k,) arrays, length
+    r_inner, r_outer : (k,) arrays, length
         Radii of each domain between which q falls.
 
     Returns
@@ -31,9 +31,9 @@ def weight(r: Floats, xi: Floats, inner: Floats, outer: Floats) -> tuple[Floats,
     q : (k, q) array
     gradient : (k, q, d) array, 1/length
     """
-    inner = inner[:, None]
-    width = outer[:, None] - inner
-    z = np.clip((r - inner) / width, 0.0, 1.0)
+    r_inner = r_inner[:, None]
+    width = r_outer[:, None] - r_inner
+    z = np.clip((r - r_inner) / width, 0.0, 1.0)
     q = 1 - z**3 * (10 - 15 * z + 6 * z**2)
     slope = -30 * z**2 * (1 - z) ** 2 / width
     return q, slope[..., None] * (xi / np.maximum(r, 1e-300)[:, None])[None]
@@ -219,11 +219,11 @@ def _at_rest(sif: SIF, solution: Solution, c: int, size: float) -> Bools:
     if contact.shear is None or contact.stuck is None or contact.slip is None:  # no friction
         return np.zeros(len(sif.x), dtype=bool)
     slip = np.abs(contact.slip).reshape(len(contact.points), -1).max(axis=1)
-    largest = np.abs(solution.u).max(initial=0.0)
-    is_at_rest = np.asarray(contact.stuck) & (slip <= _REST * largest)
+    largest_u = np.abs(solution.u).max(initial=0.0)
+    is_at_rest = np.asarray(contact.stuck) & (slip <= _REST * largest_u)
     tree = cKDTree(contact.points)
-    neighbours, nearest = tree.query_ball_point(sif.x, size), tree.query(sif.x)[1]
-    rows = [rows_nearby or [first] for rows_nearby, first in zip(neighbours, nearest, strict=True)]
+    neighbours, nearest_rows = tree.query_ball_point(sif.x, size), tree.query(sif.x)[1]
+    rows = [rows_nearby or [row] for rows_nearby, row in zip(neighbours, nearest_rows, strict=True)]
     return np.array([is_at_rest[rows_of_place].all() for rows_of_place in rows], dtype=bool)
 
 
@@ -250,10 +250,10 @@ def pressure_at(sif: SIF, solution: Solution, c: int) -> Floats:
     if contact is None or not len(contact.points):
         return np.zeros(len(sif.x))
     if len(sif.x) == 1:  # of a 2D crack; a tree takes longer to build than to look at all
-        nearest = ((contact.points - sif.x) ** 2).sum(axis=1).argmin(keepdims=True)
+        rows = ((contact.points - sif.x) ** 2).sum(axis=1).argmin(keepdims=True)
     else:
-        nearest = cKDTree(contact.points).query(sif.x)[1]
-    return np.where(contact.closed[nearest], np.maximum(contact.pressure[nearest], 0.0), 0.0)
+        rows = cKDTree(contact.points).query(sif.x)[1]
+    return np.where(contact.closed[rows], np.maximum(contact.pressure[rows], 0.0), 0.0)
 
 
 def is_pressed(sif: SIF, solution: Solution, c: int) -> Bools:

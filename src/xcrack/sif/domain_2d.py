@@ -90,8 +90,8 @@ def _ring_parts(solution: Solution, t: int, radii: Floats) -> Iterator[RingPart]
     x = space.tips[t].x
     # Within the first radius the gradient of q vanishes, and from one to the next it is smooth.
     circles = Circles(x, np.unique([inner_radii(space.order, radii), radii]))
-    inner_radius, outer = circles.radii[[0, -1]]
-    for cells, n, degree in ring_classes(space, x, inner_radius, outer):
+    r_inner, r_outer = circles.radii[[0, -1]]
+    for cells, n, degree in ring_classes(space, x, r_inner, r_outer):
         if not elasticity.is_uniform:
             cells = np.setdiff1d(
                 cells, elasticity.cells_unlike(material_at_tip(solution, t), cells)
@@ -99,7 +99,7 @@ def _ring_parts(solution: Solution, t: int, radii: Floats) -> Iterator[RingPart]
         yield _ring_part(space, cells, n, degree, circles)
     if elasticity.is_uniform:
         return
-    for cells, n, degree in ring_classes(space, x, 0.0, outer):
+    for cells, n, degree in ring_classes(space, x, 0.0, r_outer):
         cells = elasticity.cells_unlike(material_at_tip(solution, t), cells)
         yield _ring_part(space, cells, n, degree, None)
 
@@ -131,8 +131,8 @@ def ring_classes(
     )
     # A quarter of the radius is a common size: which class it is in is not left to round-off.
     share = mesh.cell_size[near_cells] / radius * (1 - 1e-9)
-    for low, high, n, degree in _DEGREES:
-        cells = near_cells[(share > low) & (share <= high)]
+    for share_min, share_max, n, degree in _DEGREES:
+        cells = near_cells[(share > share_min) & (share <= share_max)]
         if len(cells):
             yield cells, n, degree
 
@@ -244,7 +244,7 @@ def intensity_at_tip(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], 
     """
     tip = solutions[0].space.tips[t]
     domain = domain_of(solutions[0], t)
-    outer = domain.outer_radius
+    r_outer = domain.outer_radius
     radii = radii_of(domain)
     tip_material = material_at_tip(solutions[0], t)
     E_prime = tip_material.E_prime
@@ -263,7 +263,7 @@ def intensity_at_tip(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], 
             front=np.zeros(1, dtype=np.int64),
             at_surface=np.zeros(1, dtype=bool),
             closed=np.zeros(1, dtype=bool),
-            domain_cells=np.array([outer / domain.size]),
+            domain_cells=np.array([r_outer / domain.size]),
             E_prime=np.array([E_prime]),
             nu=np.array([tip_material.nu]),
         )
@@ -273,22 +273,22 @@ def intensity_at_tip(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], 
 
 def radii_of(domain: Domain) -> Floats:
     """Outer radii of the two domains `(2,)`."""
-    outer = domain.outer_radius
-    return np.array([outer, max(_SECOND * outer, min(outer, 1.5 * domain.size))])
+    r_outer = domain.outer_radius
+    return np.array([r_outer, max(_SECOND * r_outer, min(r_outer, 1.5 * domain.size))])
 
 
 def _integrals(solutions: Sequence[Solution], t: int, radii: Floats) -> Floats:
     """I of modes I, II and of the point force for each state and domain `(s, radii, 3)`."""
     space, tip = solutions[0].space, solutions[0].space.tips[t]
     ring = ring_around(solutions, t, radii)
-    outer = float(radii.max())
+    r_outer = float(radii.max())
     total = lip_terms(solutions, ring)
     for part in ring_parts(solutions[0], t, radii):
         total += plain_terms(solutions, ring, part)
         for values in part.other_points:
             total += point_terms(solutions, ring, values, part.has_other_material)
     if has_effect(solutions, "volume", "initial_stress"):
-        for cells, n, degree in ring_classes(space, tip.x, 0.0, outer):
+        for cells, n, degree in ring_classes(space, tip.x, 0.0, r_outer):
             for points in class_points(space, cells, n, degree):
                 total += volume_terms(solutions, ring, points)
     return total
@@ -311,10 +311,10 @@ def domain_of(solution: Solution, t: int) -> Domain:
     free_distance, _ = nearest_boundary(space.mesh, tip.x)
     radii_of_tip: list[float] = []
     other_reaches: list[float] = []
-    for other in space.tips:
-        if other is not tip:
-            distance = float(np.linalg.norm(other.x - tip.x))
-            (radii_of_tip if other.crack == tip.crack else other_reaches).append(distance)
+    for other_tip in space.tips:
+        if other_tip is not tip:
+            distance = float(np.linalg.norm(other_tip.x - tip.x))
+            (radii_of_tip if other_tip.crack == tip.crack else other_reaches).append(distance)
     lips = [
         float(np.linalg.norm(points.x - tip.x, axis=1).min())
         for c, points in enumerate(solution.lips)

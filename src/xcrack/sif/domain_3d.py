@@ -207,7 +207,7 @@ def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool
     radius = _wanted_radius(solution, t)
     x, frame, _ = curve.at(np.array([0.0, curve.length]))
     other_ends = [
-        np.array(one.x) for one in space.tips if one.crack == tip.crack and one.number != tip.number
+        np.array(f.x) for f in space.tips if f.crack == tip.crack and f.number != tip.number
     ]
     result = []
     for e, sign in ((0, -1.0), (1, 1.0)):
@@ -312,9 +312,9 @@ def front_values(
     room = np.where(is_valid, np.minimum(room, room_at_sides), room)
     radius = np.clip(room, _LEAST * size, target_radius)
     radii = radius[:, None] * np.array([1.0, SECOND])
-    outer = float(radius.max())
-    distance = curve.distance(space.mesh.points, outer)
-    turn = np.stack([mean_rotation(s, distance, outer) for s in solutions], axis=-1)
+    r_outer = float(radius.max())
+    distance = curve.distance(space.mesh.points, r_outer)
+    turn = np.stack([mean_rotation(s, distance, r_outer) for s in solutions], axis=-1)
     total = _lip_part(solutions, t, curve, knots, radii, turn, materials)
     if sides is not None:
         total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn, materials)
@@ -362,8 +362,8 @@ def _ends_at_planes(
     if sides is None:
         return False, False
     s = sides.feet.s[sides.is_smooth]
-    first, last = (bool((np.abs(s - end) < _AT_PLANE * size).any()) for end in ends)
-    return first, last
+    at_start, at_end = (bool((np.abs(s - end) < _AT_PLANE * size).any()) for end in ends)
+    return at_start, at_end
 
 
 def _spacing(
@@ -398,9 +398,9 @@ def _room(solution: Solution, t: int, curve: FrontCurve, knots: Floats, size: fl
     room = _BENT * curve.bend(s.ravel(), size)
     cracks = solution.space.cracks
     cracks_under = [on for on, _ in cracks[tip.crack].ends_on]  # their faces bound the domains
-    for other in solution.space.tips:
-        if other is not tip and not are_opposite(cracks[other.crack], cracks[tip.crack]):
-            room = np.minimum(room, 0.8 * cKDTree(other.x).query(x)[0])
+    for other_tip in solution.space.tips:
+        if other_tip is not tip and not are_opposite(cracks[other_tip.crack], cracks[tip.crack]):
+            room = np.minimum(room, 0.8 * cKDTree(other_tip.x).query(x)[0])
     for c, lips in enumerate(solution.lips):
         if c == tip.crack or c in cracks_under or are_opposite(cracks[c], cracks[tip.crack]):
             continue
@@ -422,11 +422,11 @@ def _domain_parts(
     space = solutions[0].space
     tip = space.tips[t]
     mesh, psi = space.mesh, space.cuts[tip.crack].level_set.psi[tip.number]
-    outer = float(radii.max())
+    r_outer = float(radii.max())
     coefficients = np.stack([solution.coefficients for solution in solutions], axis=-1)
     initial_stress, elasticity = initial_stresses(solutions), solutions[0].problem.elasticity
     middle = mesh.cell_middles
-    reach = 1.05 * outer
+    reach = 1.05 * r_outer
     distance = curve.distance(middle, reach + float(mesh.cell_size.max())) - reach
     cells = np.nonzero(distance <= mesh.cell_size)[0]
     reach = np.linalg.norm(mesh.points[mesh.cells[cells]] - middle[cells, None], axis=2).max(axis=1)
@@ -435,7 +435,7 @@ def _domain_parts(
     def part(first: int) -> Floats | None:
         points = cell_points(space, cells[first : first + _CHUNK], _POINTS, _DEGREE, True)
         x = position(space, points.cell, points.bary)
-        near_points, feet = curve.points_near(x, outer)
+        near_points, feet = curve.points_near(x, r_outer)
         if not len(near_points):
             return None
         points = points.subset(near_points)
@@ -514,13 +514,13 @@ def _lip_part(
     """Lip integrals of the hats `(n, k, 3, p)`."""
     space = solutions[0].space
     c = space.tips[t].crack
-    lips, outer = solutions[0].lips[c], float(radii.max())
-    near_points, feet = curve.points_near(lips.x, outer)
+    lips, r_outer = solutions[0].lips[c], float(radii.max())
+    near_points, feet = curve.points_near(lips.x, r_outer)
     feet = _as_seen(solutions[0], t, near_points, feet)
     pressure = np.stack([lip_pressure(solution, c)[near_points] for solution in solutions], axis=-1)
-    is_inside = feet.r < outer
+    is_inside = feet.r < r_outer
     height = np.abs(feet.offset[is_inside, 1]).max(initial=0.0)
-    is_bent = height > 1e-9 * outer
+    is_bent = height > 1e-9 * r_outer
     traction = lips.normal[near_points][:, :, None] * pressure[:, None]
     for k, shear in enumerate(lip_shear(solution, c) for solution in solutions):
         if shear is not None:
@@ -562,11 +562,11 @@ def _as_seen(solution: Solution, t: int, rows: Ints, feet: FootPoints) -> FootPo
     corner = space.mesh.cells[lips.cell[rows, 1]]
     psi = space.cuts[tip.crack].level_set.psi[tip.number][corner]
     psi_of_lips = np.einsum("qb,qb->q", lips.bary[rows, 1], psi)
-    local = np.array(feet.offset)
+    xi = np.array(feet.offset)
     # Out of reach of the tube psi has only a sign.
-    is_within = np.abs(psi_of_lips - local[:, 0]) < tip.radius
-    local[is_within, 0] = psi_of_lips[is_within]
-    return replace(feet, offset=local)
+    is_within = np.abs(psi_of_lips - xi[:, 0]) < tip.radius
+    xi[is_within, 0] = psi_of_lips[is_within]
+    return replace(feet, offset=xi)
 
 
 def _on_lip(solution: Solution, c: int, rows: Ints, s: int, sign: int) -> tuple[Ints, Floats, Ints]:

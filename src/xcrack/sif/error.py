@@ -170,8 +170,8 @@ def _contributions_near(solution: Solution, result: Estimate, x: Floats) -> Floa
     if not len(x):
         return np.zeros_like(result.eta)
     is_near = _cells_near(solution, x)
-    every = [shares(result.surplus, parts, is_total=True)[is_near] for parts in result.parts]
-    return np.asarray(np.sum(every, axis=1))
+    cell_shares = [shares(result.surplus, parts, is_total=True)[is_near] for parts in result.parts]
+    return np.asarray(np.sum(cell_shares, axis=1))
 
 
 def _signed_near(solution: Solution, result: Estimate, x: Floats) -> Floats:
@@ -181,8 +181,8 @@ def _signed_near(solution: Solution, result: Estimate, x: Floats) -> Floats:
     w = result.surplus
     functions = np.unique(w.functions[_cells_near(solution, x)])
     copies = w.copy[functions]
-    every = np.concatenate([functions, copies[copies >= 0]])
-    return np.asarray(result.parts[:, every].sum(axis=1))
+    all_functions = np.concatenate([functions, copies[copies >= 0]])
+    return np.asarray(result.parts[:, all_functions].sum(axis=1))
 
 
 def _at_pressed_junctions(solutions: Sequence[Solution], result: Estimate) -> tuple[Floats, Floats]:
@@ -204,9 +204,9 @@ def _inner_corners(mesh: Mesh) -> Floats:
     total = np.zeros(mesh.n_points)
     for i in range(3):
         a, b, c = (mesh.points[mesh.cells[:, (i + k) % 3]] for k in range(3))
-        side, other = b - a, c - a
-        cross = side[:, 0] * other[:, 1] - side[:, 1] * other[:, 0]
-        angle = np.abs(np.arctan2(cross, np.einsum("ij,ij->i", side, other)))
+        side, other_side = b - a, c - a
+        cross = side[:, 0] * other_side[:, 1] - side[:, 1] * other_side[:, 0]
+        angle = np.abs(np.arctan2(cross, np.einsum("ij,ij->i", side, other_side)))
         np.add.at(total, mesh.cells[:, i], angle)
     is_corner = np.zeros(mesh.n_points, dtype=bool)
     is_corner[mesh.boundary] = True
@@ -280,8 +280,8 @@ def tip_bars(solutions: Sequence[Solution], sifs: Sequence[SIF], crack: int) -> 
     bars = bars_and_shares(solutions, sifs, crack)[0]
     common_reason = _refusal_of_short_parts(solutions[0], crack)
     reasons = [common_reason or _refusal_at_kinks(s, crack) for s in solutions]
-    every = zip(bars, reasons, strict=True)
-    return [_without_estimate(one, reason) if reason else one for one, reason in every]
+    pairs = zip(bars, reasons, strict=True)
+    return [_without_estimate(bar, reason) if reason else bar for bar, reason in pairs]
 
 
 def bars_and_shares(
@@ -437,14 +437,14 @@ def _round_kinks(solution: Solution, crack: int) -> list[Floats]:
     if not len(kinks):
         return []
     # A kink of the cut is that kink of the crack which is nearest to it.
-    nearest = np.linalg.norm(of_cut[:, None] - kinks, axis=2).argmin(axis=1)
+    nearest_kink = np.linalg.norm(of_cut[:, None] - kinks, axis=2).argmin(axis=1)
     sizes = cell_sizes(solution.problem.mesh, kinks)
     distances = [
-        np.linalg.norm(of_cut[nearest == k] - x, axis=1).min(initial=np.inf)
+        np.linalg.norm(of_cut[nearest_kink == k] - x, axis=1).min(initial=np.inf)
         for k, x in enumerate(kinks)
     ]
-    every = zip(kinks, distances, sizes, strict=True)
-    return [x for x, d, size in every if d > size and _faces_press(solution, crack, x)]
+    kink_rows = zip(kinks, distances, sizes, strict=True)
+    return [x for x, d, size in kink_rows if d > size and _faces_press(solution, crack, x)]
 
 
 def _refusal_at_kinks(solution: Solution, crack: int) -> str:
@@ -482,8 +482,8 @@ def doubts_at_kinks(solutions: Sequence[Solution], crack: int) -> list[str]:
         States of one solve in 2D.
     crack : int
     """
-    every = (_refusal_at_kinks(solution, crack) for solution in solutions)
-    first = next((text for text in every if text), "")
+    refusals = (_refusal_at_kinks(solution, crack) for solution in solutions)
+    first = next((text for text in refusals if text), "")
     return [f"K of crack {crack}: {first}."] if first else []
 
 
@@ -628,8 +628,8 @@ def bars_beside(
     ):
         return [no_bars(sif.K.shape, reason) for sif in sifs]
     return [
-        _of_difference(sif, other, has_friction)
-        for sif, other in zip(sifs, better_sifs, strict=True)
+        _of_difference(sif, better_sif, has_friction)
+        for sif, better_sif in zip(sifs, better_sifs, strict=True)
     ]
 
 
@@ -655,9 +655,9 @@ def _of_difference(sif: SIF, finer_sif: SIF, has_friction: bool) -> KErrors:
     finer_K, domain_error = np.empty((2, *sif.K.shape))
     half = _half_of_spread(finer_sif) if has_friction else np.zeros_like(finer_sif.K)
     for front in np.unique(sif.front):
-        is_on_front, other = sif.front == front, finer_sif.front == front
+        is_on_front, rows = sif.front == front, finer_sif.front == front
         for to, values in ((finer_K, finer_sif.K), (domain_error, half)):
-            to[is_on_front] = _at(sif.x[is_on_front], finer_sif.x[other], values[other])
+            to[is_on_front] = _at(sif.x[is_on_front], finer_sif.x[rows], values[rows])
     eta = finer_K - sif.K
     eta[sif.closed, 0] = 0.0
     mean = _mean(sif, eta)
@@ -668,17 +668,17 @@ def _of_difference(sif: SIF, finer_sif: SIF, has_friction: bool) -> KErrors:
 
 def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:
     """Values between the vertices of a front, at the places nearest to points."""
-    nearest = np.linalg.norm(x[:, None] - vertices, axis=2).argmin(axis=1)
-    result, distance = values[nearest], np.linalg.norm(x - vertices[nearest], axis=1)
+    vertex = np.linalg.norm(x[:, None] - vertices, axis=2).argmin(axis=1)
+    result, distance = values[vertex], np.linalg.norm(x - vertices[vertex], axis=1)
     for step in (-1, 1):
-        next_to = (nearest + step) % len(vertices)  # beyond the ends the nearest stays nearer
-        side = vertices[next_to] - vertices[nearest]
+        next_to = (vertex + step) % len(vertices)  # beyond the ends the nearest stays nearer
+        side = vertices[next_to] - vertices[vertex]
         square = np.einsum("ij,ij->i", side, side)
-        share = np.einsum("ij,ij->i", x - vertices[nearest], side)
+        share = np.einsum("ij,ij->i", x - vertices[vertex], side)
         share = np.clip(share / np.where(square > 0, square, 1.0), 0.0, 1.0)[:, None]
-        distance_to_front = np.linalg.norm(x - vertices[nearest] - share * side, axis=1)
+        distance_to_front = np.linalg.norm(x - vertices[vertex] - share * side, axis=1)
         is_nearer = distance_to_front < distance
-        interpolated = (1 - share) * values[nearest] + share * values[next_to]
+        interpolated = (1 - share) * values[vertex] + share * values[next_to]
         result = np.where(is_nearer[:, None], interpolated, result)
         distance = np.minimum(distance, distance_to_front)
     return np.asarray(result)
@@ -687,10 +687,10 @@ def _at(x: Floats, vertices: Floats, values: Floats) -> Floats:
 def _mean(sif: SIF, values: Floats) -> Floats:
     """Root mean square of values along the front of each place."""
     result = np.array(values)
-    inner = ~sif.at_surface if not sif.at_surface.all() else sif.at_surface
+    counts = ~sif.at_surface if not sif.at_surface.all() else sif.at_surface
     for front in np.unique(sif.front):
         is_on_front = sif.front == front
-        rows = values[is_on_front & inner] if (is_on_front & inner).any() else values[is_on_front]
+        rows = values[is_on_front & counts] if (is_on_front & counts).any() else values[is_on_front]
         result[is_on_front] = np.sqrt((rows**2).mean(axis=0))
     return result
 
@@ -749,10 +749,10 @@ def finer_along(problem: Problem, crack: int) -> Mesh:
     )
     centre = mesh.cell_middles
     is_near = front.query(centre)[0] <= _NEAR_FRONT * mesh.cell_size
-    each = np.where(is_near, mesh.cell_size / FINER, np.inf)
+    sizes = np.where(is_near, mesh.cell_size / FINER, np.inf)
 
     def size_at(x: Floats) -> Floats:
-        return np.asarray(each[mesh.cell_tree.query(x)[1]])
+        return np.asarray(sizes[mesh.cell_tree.query(x)[1]])
 
     return refine(mesh, size=size_at)
 
@@ -785,15 +785,15 @@ def with_bars(
     result = [replace(sif, errors=KErrors(zero, zero, ("",) * len(zero))) for sif in sifs]
     if not numbers_under_load:
         return result
-    chosen = [solutions[k] for k in numbers_under_load]
-    of_dim = _BARS[by].get(chosen[0].space.dim)
+    loaded_solutions = [solutions[k] for k in numbers_under_load]
+    of_dim = _BARS[by].get(loaded_solutions[0].space.dim)
     if of_dim is None:
         raise ProblemError(
             'stress_intensity: error="front" is for fronts in 3D: give True, from one solve.'
         )
     for k, bars in zip(
         numbers_under_load,
-        of_dim(chosen, [sifs[k] for k in numbers_under_load], crack),
+        of_dim(loaded_solutions, [sifs[k] for k in numbers_under_load], crack),
         strict=True,
     ):
         result[k] = replace(sifs[k], errors=bars)

@@ -116,14 +116,16 @@ def bars_by_finer_cells(
         by_tip = [intensity_at_tip(finer_solutions_, t)[0] for t in tips]
     if len(tips) != len(sifs[0].K):
         return None
-    second = [joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer_solutions_))]
-    of_second = estimate(finer_solutions_, second, crack)
+    second_sifs = [
+        joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer_solutions_))
+    ]
+    of_second = estimate(finer_solutions_, second_sifs, crack)
     cells = None
     if finer_solutions_[0].has_friction:
         length = float(finer_solutions_[0].lips[crack].weight.sum())
         cells = np.array([domain_of(finer_solutions_[0], t).size for t in tips]) / length
-    every = zip(sifs, second, of_second, strict=True)
-    return [_from_second(*one, cells) for one in every]
+    state_rows = zip(sifs, second_sifs, of_second, strict=True)
+    return [_from_second(*row, cells) for row in state_rows]
 
 
 def _half_widths_of_change(change: Floats) -> Floats:
@@ -132,34 +134,34 @@ def _half_widths_of_change(change: Floats) -> Floats:
     return np.asarray(np.maximum(np.abs(change), _LEAST * change_size.max(initial=0.0)))
 
 
-def _half_widths_of_friction(second: SIF, change: Floats, cells: Floats) -> Floats:
+def _half_widths_of_friction(second_sif: SIF, change: Floats, cells: Floats) -> Floats:
     """What the change, the spread and the cells of the second solution leave; cells per length."""
-    largest = np.abs(second.K).max(initial=0.0)
+    largest_K = np.abs(second_sif.K).max(initial=0.0)
     parts = [
         np.full(len(cells), _RUBBED_CHANGE * np.abs(change).max(initial=0.0)),
-        _RUBBED_SPREAD * np.linalg.norm(second.spread, axis=1),
-        _RUBBED_CELLS * largest * cells**1.5,
+        _RUBBED_SPREAD * np.linalg.norm(second_sif.spread, axis=1),
+        _RUBBED_CELLS * largest_K * cells**1.5,
     ]
     half = np.sqrt(np.sum(np.square(parts), axis=0))
     return np.asarray(np.repeat(half[:, None], change.shape[1], axis=1))
 
 
-def _from_second(sif: SIF, second: SIF, of_second: KErrors, cells: Floats | None) -> KErrors:
+def _from_second(sif: SIF, second_sif: SIF, of_second: KErrors, cells: Floats | None) -> KErrors:
     """Bars of one state from the second solution; with friction by its cells per length."""
     reasons_that_stay = ["" if has_help(reason) else reason for reason in of_second.reasons]
     is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
-    best = np.where(is_known[:, None], second.K + of_second.eta, second.K)
-    eta = best - sif.K
+    best_K = np.where(is_known[:, None], second_sif.K + of_second.eta, second_sif.K)
+    eta = best_K - sif.K
     eta[sif.closed, 0] = 0.0  # K_I of closed tips is zero
     eta_size = np.linalg.norm(eta, axis=1, keepdims=True)
     half = (
         _half_widths_of_change(eta)
         if cells is None
-        else _half_widths_of_friction(second, eta, cells)
+        else _half_widths_of_friction(second_sif, eta, cells)
     )
     bar_of_second = np.hypot(of_second.bar, _ADDED * eta_size)
     bar = np.where(is_known[:, None], bar_of_second, half)
-    K_if_open = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best[:, 0]))
+    K_if_open = np.maximum(np.abs(sif.K_integral[:, 0]), np.abs(best_K[:, 0]))
     bar[sif.closed, 0] = K_if_open[sif.closed]
     contact = np.zeros_like(bar) if of_second.contact is None else np.array(of_second.contact)
     return bars_of(eta, bar, reasons_that_stay, np.where(is_known[:, None], contact, 0.0))

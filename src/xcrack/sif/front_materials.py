@@ -55,17 +55,17 @@ class FrontMaterials:
     @property
     def changes(self) -> Floats:
         """Parameters at which the material changes, length."""
-        inner = self.breaks[1:-1]
+        inner_breaks = self.breaks[1:-1]
         if self.period is None or len(self.references) < 2:
-            return inner
-        return np.append(inner, self.breaks[-1])
+            return inner_breaks
+        return np.append(inner_breaks, self.breaks[-1])
 
     def pieces(self, s: Floats) -> Ints:
         """Number of the piece at parameters `(q,)`."""
         if self.period is not None:
             s = np.mod(s - self.breaks[0], self.period) + self.breaks[0]
-        last = len(self.references) - 1
-        return np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, last)
+        last_piece = len(self.references) - 1
+        return np.clip(np.searchsorted(self.breaks, s, side="right") - 1, 0, last_piece)
 
     def ratio(self, piece: int, s: Floats) -> tuple[Floats, Floats] | None:
         """E over that of the reference, and the derivative of its logarithm; None where it is 1."""
@@ -172,16 +172,16 @@ def front_materials(solution: Solution, t: int, curve: FrontCurve, size: float) 
 
 
 def _parameter_between(
-    number_at: Callable[[Floats], Ints], low: float, high: float, number: int
+    number_at: Callable[[Floats], Ints], s_min: float, s_max: float, number: int
 ) -> float:
-    """Parameter at which the material of `low` ends."""
+    """Parameter at which the material of `s_min` ends."""
     for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
+        middle = 0.5 * (s_min + s_max)
         if number_at(np.array([middle]))[0] == number:
-            low = middle
+            s_min = middle
         else:
-            high = middle
-    return 0.5 * (low + high)
+            s_max = middle
+    return 0.5 * (s_min + s_max)
 
 
 def _reference(
@@ -233,7 +233,7 @@ def warn_of_changes(materials: FrontMaterials, curve: FrontCurve, is_moved: Bool
         return
     s = materials.changes
     x = curve.at(np.mod(s, materials.period) if materials.period is not None else s)[0]
-    places = ", ".join(str(at(each)) for each in x)
+    places = ", ".join(str(at(place)) for place in x)
     warn(
         f"the front passes into another material at {places}: the stresses at that corner go like "
         f"another power of the distance, and K has no limit there. The {int(is_moved.sum())} "

@@ -47,12 +47,12 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     space, tip_material = solution.space, material_at_tip(solution, t)
     mesh, tip = space.mesh, space.tips[t]
     radii = radii_of(domain_of(solution, t))
-    outer = float(radii.max())
-    inner = float(inner_radii(space.order, radii[:1])[0])
+    r_outer = float(radii.max())
+    r_inner = float(inner_radii(space.order, radii[:1])[0])
     cut = space.cuts[tip.crack]
     psi = cut.level_set.psi[tip.number]
     ring = (
-        outer, inner, np.ascontiguousarray(tip.frame),
+        r_outer, r_inner, np.ascontiguousarray(tip.frame),
         0.5 * tip_material.E_prime * mode_matrix(tip_material.kolosov, tip_material.mu),
         tip_material.lam, tip_material.mu,
     )  # fmt: skip
@@ -75,9 +75,9 @@ def tip_goal(solution: Solution, t: int) -> Goal:
                 mesh.points, mesh.cells, psi, tip.x, *ring, change,
             )  # fmt: skip
             parts.append(GoalPoints(at, factor))
-    rotation = _rotation(solution, t, outer)
-    faces = partial(_faces, solution, t, outer, inner)
-    if _has_bent_faces(solution, t, outer):
+    rotation = _rotation(solution, t, r_outer)
+    faces = partial(_faces, solution, t, r_outer, r_inner)
+    if _has_bent_faces(solution, t, r_outer):
         on_crack, pressure, _ = faces()
         parts.extend(on_crack)
         return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: pressure)
@@ -93,40 +93,40 @@ def constant(solution: Solution, t: int) -> Floats:
     total = np.zeros(2)
     if not has_effect([solution], "volume", "initial_stress"):
         return total
-    outer = domain_of(solution, t).outer_radius
-    radii = np.array([outer])
+    r_outer = domain_of(solution, t).outer_radius
+    radii = np.array([r_outer])
     ring = ring_around([solution], t, radii)
-    for cells, n, degree in ring_classes(space, space.tips[t].x, 0.0, outer):
+    for cells, n, degree in ring_classes(space, space.tips[t].x, 0.0, r_outer):
         for points in class_points(space, cells, n, degree):
             total += scale * volume_terms([solution], ring, points)[0, 0, :2]
     x, cell, bary = tip_place(solution, t)
     stress_of_tip = initial_stress_at(solution, cell, bary, x, True)[0]
-    _, _, per_stress = _faces(solution, t, outer, float(inner_radii(space.order, radii)[0]))
+    _, _, per_stress = _faces(solution, t, r_outer, float(inner_radii(space.order, radii)[0]))
     return np.asarray(total + np.einsum("ijm,ij->m", per_stress, stress_of_tip))
 
 
-def _rotation(solution: Solution, t: int, outer: float) -> Floats:
+def _rotation(solution: Solution, t: int, r_outer: float) -> Floats:
     """Mean rotation of the mesh points around the tip as a functional; see `mean_rotation`."""
     points = solution.space.mesh.points
     result = np.zeros_like(points)
     distance = distances_to(solution.space, solution.space.tips[t].x)
-    near_points = np.nonzero(distance < outer * (1 - 1e-9))[0]
+    near_points = np.nonzero(distance < r_outer * (1 - 1e-9))[0]
     if len(near_points) > points.shape[1]:
         y = points[near_points] - points[near_points].mean(axis=0)
         result[near_points] = np.stack([-y[:, 1], y[:, 0]], axis=1) / (y * y).sum()
     return result
 
 
-def _has_bent_faces(solution: Solution, t: int, outer: float) -> bool:
+def _has_bent_faces(solution: Solution, t: int, r_outer: float) -> bool:
     """Whether faces in the domain leave the line through the tip."""
     tip = solution.space.tips[t]
     way = solution.lips[tip.crack].x - tip.x
-    normal_distance = np.abs(way @ tip.frame[1])[np.linalg.norm(way, axis=1) < outer]
-    return bool((normal_distance >= _STRAIGHT * outer).any())
+    normal_distance = np.abs(way @ tip.frame[1])[np.linalg.norm(way, axis=1) < r_outer]
+    return bool((normal_distance >= _STRAIGHT * r_outer).any())
 
 
 def _faces(
-    solution: Solution, t: int, outer: float, inner: float
+    solution: Solution, t: int, r_outer: float, r_inner: float
 ) -> tuple[Sequence[GoalPoints], Floats, Floats]:
     """Gradients on bent faces, factors of pressures `(q, 2)` and of the stress at the tip."""
     space, tip_material = solution.space, material_at_tip(solution, t)
@@ -134,11 +134,11 @@ def _faces(
     lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * tip_material.E_prime
     pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
     way = lips.way_from(space.mesh, tip.x)
-    near_points = np.nonzero(np.linalg.norm(way, axis=1) < outer)[0]
+    near_points = np.nonzero(np.linalg.norm(way, axis=1) < r_outer)[0]
     if not len(near_points):
         return (), pressure, per_stress
     xi = way[near_points] @ R.T
-    xi[np.abs(xi[:, 1]) < _STRAIGHT * outer, 1] = 0.0
+    xi[np.abs(xi[:, 1]) < _STRAIGHT * r_outer, 1] = 0.0
     is_bent = bool(xi[:, 1].any())
     parts = []
     for s, sign in ((0, -1), (1, 1)):
@@ -146,7 +146,7 @@ def _faces(
         side = lip_side(space, tip.crack, cell, bary, sign)
         r, theta = continued_polar(xi, side[:, tip.crack], np.ones(len(xi), dtype=bool))
         outward_normal = -sign * lips.normal[near_points] @ R.T
-        q, _ = weight(r, xi, np.array([inner]), np.array([outer]))
+        q, _ = weight(r, xi, np.array([r_inner]), np.array([r_outer]))
         w = scale * q[0] * lips.weight[near_points]
         factor = np.zeros((len(near_points), 2, 2, 2))
         for m, g in enumerate(unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]):
@@ -154,10 +154,10 @@ def _faces(
             if not is_bent:
                 continue
             sigma = tip_material.stress(g)
-            local = sigma * outward_normal[:, :1, None]
+            local_tensor = sigma * outward_normal[:, :1, None]
             per_stress[:, :, m] += R.T @ np.einsum("q,qij->ij", w * outward_normal[:, 0], g) @ R
-            local[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward_normal)
-            factor[..., m] = np.einsum("q,ai,qab,bj->qij", w, R, local, R)
+            local_tensor[:, :, 0] -= np.einsum("qij,qj->qi", sigma, outward_normal)
+            factor[..., m] = np.einsum("q,ai,qab,bj->qij", w, R, local_tensor, R)
         if is_bent:
             at = tabulate_functions(space, Points(cell, bary, lips.weight[near_points], side))
             parts.append(GoalPoints(at, factor))
@@ -185,7 +185,7 @@ def _singular_part(solution: Solution, t: int, lips: LipPoints) -> tuple[Floats,
     tip = space.tips[t]
     R = tip.frame
     radius = domain_of(solution, t).outer_radius
-    outer = np.array([radius])
+    r_outer = np.array([radius])
     values, gradients = np.zeros((2, len(lips), 2, 2)), np.zeros((2, len(lips), 2, 2, 2))
     way = lips.way_from(space.mesh, tip.x)
     near_points = np.nonzero(np.linalg.norm(way, axis=1) < radius)[0]
@@ -193,12 +193,12 @@ def _singular_part(solution: Solution, t: int, lips: LipPoints) -> tuple[Floats,
     for s, sign in ((0, -1), (1, 1)):
         side = np.full(len(near_points), sign)
         r, theta = continued_polar(xi, side, np.ones(len(near_points), dtype=bool))
-        q, dq = weight(r, xi, inner_radii(space.order, outer), outer)
+        q, dq = weight(r, xi, inner_radii(space.order, r_outer), r_outer)
         fields = unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]
         curves = ahead_derivative(tip_material, r, theta)[:2]
         for m, (g, curve) in enumerate(zip(fields, curves, strict=True)):
             scale = 0.5 * tip_material.E_prime
             values[s, near_points, :, m] = scale * q[0][:, None] * (g[:, :, 0] @ R)
-            local = q[0][:, None, None] * curve + g[:, :, :1] * dq[0][:, None]
-            gradients[s, near_points, :, :, m] = scale * (R.T @ local @ R)
+            grad = q[0][:, None, None] * curve + g[:, :, :1] * dq[0][:, None]
+            gradients[s, near_points, :, :, m] = scale * (R.T @ grad @ R)
     return values, gradients

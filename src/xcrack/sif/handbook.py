@@ -504,23 +504,23 @@ def _corner_angle(x: Floats, frame: Floats, a: float, c: float) -> Floats:
     Which end is that of c is told by the distances of the ends from the corner: of a quarter circle
     it is not known, where K differs by 2 %.
     """
-    best, angle = np.inf, np.full(len(x), np.nan)
+    least_misfit, angle = np.inf, np.full(len(x), np.nan)
     chord = x[-1] - x[0]
     normal = frame[:, 1].mean(axis=0)
     cross_axis = np.cross(normal, chord / np.linalg.norm(chord))
     cross_axis *= -np.sign(cross_axis @ (x[len(x) // 2] - x[0])) or 1.0
     length = float(np.linalg.norm(chord))
-    for first, last in ((a, c), (c, a)):
-        # The corner sees the ends at a right angle, at the distances first and last.
-        share = (first**2 - last**2 + length**2) / (2 * length)
-        height = np.sqrt(max(first**2 - share**2, 0.0))
+    for d_start, d_end in ((a, c), (c, a)):
+        # The corner sees the ends at a right angle, at the distances d_start and d_end.
+        share = (d_start**2 - d_end**2 + length**2) / (2 * length)
+        height = np.sqrt(max(d_start**2 - share**2, 0.0))
         corner = x[0] + share * chord / length + height * cross_axis
-        one, other = x[0] - corner, x[-1] - corner
-        u, v = (x - corner) @ one / (one @ one), (x - corner) @ other / (other @ other)
+        p, q = x[0] - corner, x[-1] - corner
+        u, v = (x - corner) @ p / (p @ p), (x - corner) @ q / (q @ q)
         misfit = float(np.abs(u**2 + v**2 - 1).max())
-        if misfit < best:
-            best = misfit
-            angle = np.arctan2(u, v) if first == a else np.arctan2(v, u)
+        if misfit < least_misfit:
+            least_misfit = misfit
+            angle = np.arctan2(u, v) if d_start == a else np.arctan2(v, u)
     return angle
 
 
@@ -626,8 +626,8 @@ class CornerCrackAtHole(EllipticFront):
 
 
 KINDS: Mapping[str, type[HandbookK]] = {
-    one.kind: one
-    for one in (
+    crack_type.kind: crack_type
+    for crack_type in (
         ThroughCrack, EdgeCrack, BendSpecimen, CompactSpecimen, DiscSpecimen, HoleCrack, LugCrack,
         EmbeddedCrack, SurfaceCrack, CornerCrack, CornerCrackAtHole,
     )

@@ -86,7 +86,7 @@ class IntegrationRing:
     ----------
     t : int
         Number of the tip.
-    radii, inner : (k,) arrays, length
+    radii, inner_radii : (k,) arrays, length
         Outer radii of the domains, and radii within which their weight is one.
     turn : (d, d, s) array
         Mean rotation of each state, subtracted from its gradients.
@@ -95,7 +95,7 @@ class IntegrationRing:
 
     t: int
     radii: Floats
-    inner: Floats
+    inner_radii: Floats
     turn: Floats
     coefficients: Floats
 
@@ -115,7 +115,7 @@ def _constants(solution: Solution, ring: IntegrationRing) -> tuple[Any, ...]:
     """Last arguments of the kernels of domain integrals."""
     tip, tip_material = solution.space.tips[ring.t], material_at_tip(solution, ring.t)
     return (
-        tip.x, ring.turn, ring.radii, ring.inner, np.ascontiguousarray(tip.frame),
+        tip.x, ring.turn, ring.radii, ring.inner_radii, np.ascontiguousarray(tip.frame),
         mode_matrix(tip_material.kolosov, tip_material.mu), tip_material.kolosov,
         tip_material.lam, tip_material.mu,
     )  # fmt: skip
@@ -196,7 +196,7 @@ def volume_terms(solutions: Sequence[Solution], ring: IntegrationRing, points: P
     is_behind = psi[space.mesh.cells[points.cell]].mean(axis=1) < 0
     r, theta = continued_polar(xi, points.side[:, tip.crack], is_behind)
     result = np.zeros((len(solutions), len(ring.radii), 3))
-    q, dq = weight(r, xi, ring.inner, ring.radii)
+    q, dq = weight(r, xi, ring.inner_radii, ring.radii)
     weighted_slope = points.weight[:, None] * dq  # (radii, q, d)
     for m, field in enumerate(_auxiliary_fields(solutions, ring.t, r, theta)):
         for s, solution in enumerate(solutions):
@@ -256,8 +256,8 @@ def _load_terms(
             b = factor * load.volume(x) @ R.T
             total -= np.einsum("q,qi,qi,rq->r", points.weight, b, field.gradient[:, :, 0], q)
         if "initial_stress" in load.acts:
-            where = x, points.cell, points.bary
-            initial_stress = factor * elasticity.initial_stress(load, *where, is_exact=True)
+            place = x, points.cell, points.bary
+            initial_stress = factor * elasticity.initial_stress(load, *place, is_exact=True)
             at_tip = factor * elasticity.initial_stress(
                 load, *tip_place(solution, t), is_exact=True
             )

@@ -31,7 +31,7 @@ _GAUSS = np.polynomial.legendre.leggauss(6)
 _FLAT = 1e-9  # height of a lip point, as a share of the radius, that is round-off
 
 
-def _one(s: Floats) -> Floats:
+def _unit_modulus(s: Floats) -> Floats:
     return np.ones(len(s))
 
 
@@ -60,10 +60,10 @@ def front_nodes(
         On a closed front the last hat falls to zero at the first, on an open one the first and
         the last top are its ends.
     """
-    first, last = ends or (0.0, curve.length)
-    width = spacing(np.linspace(first, last, 2))
-    count = int(np.clip(_STEPS * (last - first) / width.min(), _STEPS, 100_000))
-    s = np.linspace(first, last, count + 1)
+    s_min, s_max = ends or (0.0, curve.length)
+    width = spacing(np.linspace(s_min, s_max, 2))
+    count = int(np.clip(_STEPS * (s_max - s_min) / width.min(), _STEPS, 100_000))
+    s = np.linspace(s_min, s_max, count + 1)
     density = 1 / spacing((s[1:] + s[:-1]) / 2)
     knot_count = np.concatenate([[0.0], np.cumsum(density * np.diff(s))])
     steps = max(_FEWEST[curve.is_closed] - n_planes, round(knot_count[-1]))
@@ -311,14 +311,14 @@ def lip_integrals(
     (n, k, 3, p) array
     """
     # What is flat is so but for round-off, which 1 / r would magnify.
-    local = np.array(feet.offset)
-    local[np.abs(local[:, 1]) < _FLAT * radii.max(), 1] = 0.0
-    feet = FootPoints(feet.s, local, feet.frame, feet.turn)
-    every = np.ones(len(weight), dtype=bool)
+    xi = np.array(feet.offset)
+    xi[np.abs(xi[:, 1]) < _FLAT * radii.max(), 1] = 0.0
+    feet = FootPoints(feet.s, xi, feet.frame, feet.turn)
+    is_behind = np.ones(len(weight), dtype=bool)
     lips = [
         side_integrals(
             curve, knots, feet, -sign * normal, weight, sign * traction,
-            np.full(len(weight), sign), every, tip_material, radii,
+            np.full(len(weight), sign), is_behind, tip_material, radii,
             gradient=None if gradient is None else gradient[s], initial_stress=initial_stress,
         )
         for s, sign in ((0, -1), (1, 1))
@@ -392,7 +392,7 @@ def mean_integrals(
     knots: Floats,
     curve: FrontCurve,
     tip_material: Isotropic,
-    modulus: Callable[[Floats], Floats] = _one,
+    modulus: Callable[[Floats], Floats] = _unit_modulus,
 ) -> Floats:
     """Means of K over the hats `(n, p, 3)`, stress · √length.
 
@@ -417,7 +417,7 @@ def solve_front(
     tip_material: Isotropic,
     is_valid: Bools,
     zero: Bools | None = None,
-    modulus: Callable[[Floats], Floats] = _one,
+    modulus: Callable[[Floats], Floats] = _unit_modulus,
 ) -> Floats:
     """K at the tops of the hats: a cubic spline along the front that has the integrals found.
 
@@ -463,7 +463,7 @@ def twice_as_wide(
     tip_material: Isotropic,
     is_valid: Bools,
     zero: Bools | None = None,
-    modulus: Callable[[Floats], Floats] = _one,
+    modulus: Callable[[Floats], Floats] = _unit_modulus,
 ) -> Floats:
     """K at the tops of the hats from every other hat, each with the halves of those beside it.
 

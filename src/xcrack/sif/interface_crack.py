@@ -176,7 +176,7 @@ class Bimaterial:
         exponent = -0.5 - 1j * self.epsilon
         log_z = np.log(r) + 1j * theta
         z, z_conjugate = np.exp(log_z), np.exp(np.conj(log_z))
-        a, other = np.where(is_above, a_1, a_2), np.where(is_above, a_2, a_1)
+        a, other_a = np.where(is_above, a_1, a_2), np.where(is_above, a_2, a_1)
         kolosov, mu = (
             np.where(is_above, *(getattr(m, name) for m in self.materials))
             for name in ("kolosov", "mu")
@@ -191,7 +191,7 @@ class Bimaterial:
                 F.append((exponent - k) * F[k] / z)
                 F_bar.append((exponent - k) * F_bar[k] / z_conjugate)
             for n, result in ((0, gradients), (1, bends)):
-                Phi, Omega = F[n] / a, F_bar[n] / other
+                Phi, Omega = F[n] / a, F_bar[n] / other_a
                 slope_term = (z - z_conjugate) * np.conj(F[n + 1] / a)
                 slope_along = (kolosov * Phi - Omega - slope_term) / (2 * mu)
                 slope_across = (
@@ -250,7 +250,7 @@ def _materials_beside(solution: Solution, t: int) -> Bimaterial:
     return Bimaterial((materials[0].at_tip(), materials[1].at_tip()))
 
 
-def _straight_radius(solution: Solution, t: int, outer: float) -> float:
+def _straight_radius(solution: Solution, t: int, r_outer: float) -> float:
     """Radius within which interface and crack are the straight line through the tip, length."""
     mesh, elasticity = solution.space.mesh, solution.problem.elasticity
     tip = solution.space.tips[t]
@@ -260,14 +260,14 @@ def _straight_radius(solution: Solution, t: int, outer: float) -> float:
     number_below = elasticity.number[cells[np.argmin(height)]]
     corners = (mesh.points[mesh.cells] - tip.x) @ tip.frame.T
     number = elasticity.number
-    is_in_half = (number == number_above) & (corners[..., 1].min(axis=1) >= -_FLAT * outer)
-    is_in_half |= (number == number_below) & (corners[..., 1].max(axis=1) <= _FLAT * outer)
+    is_in_half = (number == number_above) & (corners[..., 1].min(axis=1) >= -_FLAT * r_outer)
+    is_in_half |= (number == number_below) & (corners[..., 1].max(axis=1) <= _FLAT * r_outer)
     nearest_corner = np.linalg.norm(corners, axis=2).min(axis=1)
     room = float(nearest_corner[~is_in_half].min(initial=np.inf))
     lips = solution.lips[tip.crack]
     way = lips.way_from(mesh, tip.x) @ tip.frame.T
-    is_off_line = np.abs(way[:, 1]) > _FLAT * outer
-    return min(room, float(np.linalg.norm(way[is_off_line], axis=1).min(initial=np.inf)), outer)
+    is_off_line = np.abs(way[:, 1]) > _FLAT * r_outer
+    return min(room, float(np.linalg.norm(way[is_off_line], axis=1).min(initial=np.inf)), r_outer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,14 +285,14 @@ class RingPoints:
 
 
 def _ring_points(
-    solution: Solution, t: int, inner_radius: float, outer: float
+    solution: Solution, t: int, r_inner: float, r_outer: float
 ) -> Iterator[RingPoints]:
     space, tip = solution.space, solution.space.tips[t]
     mesh, R = space.mesh, tip.frame
     psi = space.cuts[tip.crack].level_set.psi[tip.number]
     distance = distances_to(space, tip.x)
-    turn = mean_rotation(solution, distance, outer)
-    for cells, n, degree in ring_classes(space, tip.x, inner_radius, outer):
+    turn = mean_rotation(solution, distance, r_outer)
+    for cells, n, degree in ring_classes(space, tip.x, r_inner, r_outer):
         for points in class_points(space, cells, n, degree):
             x = position(space, points.cell, points.bary)
             xi = (x - tip.x) @ R.T
@@ -311,11 +311,11 @@ def _integrals(
     solution: Solution, t: int, body: Bimaterial, radii: Floats, length: float
 ) -> Floats:
     """Interaction integrals with unit K_1 and K_2 `(radii, 2)`."""
-    inner, outer = _INNER * radii, float(radii.max())
+    r_inner, r_outer = _INNER * radii, float(radii.max())
     sources = has_effect([solution], "volume", "initial_stress")
     total = np.zeros((len(radii), 2))
-    for ring in _ring_points(solution, t, 0.0 if sources else float(inner.min()), outer):
-        q, dq = weight(ring.r, ring.xi, inner, radii)
+    for ring in _ring_points(solution, t, 0.0 if sources else float(r_inner.min()), r_outer):
+        q, dq = weight(ring.r, ring.xi, r_inner, radii)
         w = ring.points.weight
         is_above = ring.xi[:, 1] > 0
         fields, bends = body.unit_fields(ring.r, ring.theta, is_above, length)
@@ -402,8 +402,8 @@ def _contact_zone(solution: Solution, t: int) -> float:
     first_open = np.nonzero(~contact.closed[order])[0]
     if len(first_open) and first_open[0] == 0:
         return 0.0
-    last = (first_open[0] if len(first_open) else len(order)) - 1
-    return float(distance[order[last]])
+    last_row = (first_open[0] if len(first_open) else len(order)) - 1
+    return float(distance[order[last_row]])
 
 
 __all__ = ["InterfaceSIF", "interface_intensity"]

@@ -82,17 +82,17 @@ def sides_around(
     curve : FrontCurve
     reach : float, length
     """
-    outer = _boundary_around(solutions, crack, curve, reach)
+    boundary_part = _boundary_around(solutions, crack, curve, reach)
     faces = _faces_around(solutions[0].space, crack, curve, reach)
-    parts = [part for part in (outer, *faces) if part is not None]
+    parts = [part for part in (boundary_part, *faces) if part is not None]
     if len(parts) < 2:
         return parts[0] if parts else None
     points, feet = [part.points for part in parts], [part.feet for part in parts]
     return Sides(
-        Points(*(np.concatenate([getattr(one, n) for one in points])
+        Points(*(np.concatenate([getattr(part, n) for part in points])
                  for n in ("cell", "bary", "weight", "side"))),
         np.concatenate([part.normal for part in parts]),
-        FootPoints(*(np.concatenate([getattr(one, n) for one in feet])
+        FootPoints(*(np.concatenate([getattr(part, n) for part in feet])
                      for n in ("s", "offset", "frame", "turn"))),
         np.concatenate([part.reaction for part in parts]),
         np.concatenate([part.is_smooth for part in parts]),
@@ -145,10 +145,10 @@ def _faces_around(space: FunctionSpace, crack: int, curve: FrontCurve, reach: fl
         size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1, initial=0.0)
         largest_size = float(size.max(initial=0.0))
         rows = np.nonzero(curve.distance(middle, reach + 2 * largest_size) <= reach + 2 * size)[0]
-        owner, local = cut.lip_cell[rows, k], cut.lip_bary[rows, k]
-        number, place, weight = part_points(space, mesh.cells[owner], local, halvings=_HALVINGS)
+        owner, lip_bary = cut.lip_cell[rows, k], cut.lip_bary[rows, k]
+        number, place, weight = part_points(space, mesh.cells[owner], lip_bary, halvings=_HALVINGS)
         cell = owner[number]
-        bary = np.einsum("qv,qvb->qb", place, local[number])
+        bary = np.einsum("qv,qvb->qb", place, lip_bary[number])
         near_points, feet = curve.points_near(position(space, cell, bary), reach)
         cell, bary, weight = cell[near_points], bary[near_points], weight[near_points]
         sides = lip_side(space, joint.on, cell, bary, joint.side)
@@ -318,7 +318,7 @@ def _loaded_points(
             continue
         points, on_facets = outer_points(space, load, _HALVINGS)
         near_points, feet = curve.points_near(on_facets.x, reach)
-        factor = np.array([sum(f for one, f in s.acting if one is load) for s in solutions])
+        factor = np.array([sum(f for part, f in s.acting if part is load) for s in solutions])
         traction = load.traction(on_facets)[near_points, :, None] * factor
         result.append((points.subset(near_points), on_facets.normal[near_points], feet, traction))
     return result

@@ -308,8 +308,8 @@ class SIF:
     def _values_along(self) -> str:
         if not len(self.K):
             return "SIF(no front)"
-        low, high = self.K.min(axis=0), self.K.max(axis=0)
-        modes = zip(("K_I", "K_II", "K_III"), low, high, strict=True)
+        K_min, K_max = self.K.min(axis=0), self.K.max(axis=0)
+        modes = zip(("K_I", "K_II", "K_III"), K_min, K_max, strict=True)
         ranges = ", ".join(f"{name} {a:.6g} to {b:.6g}" for name, a, b in modes)
         notes = "".join(
             f", {np.count_nonzero(rows)} {name}"

@@ -23,7 +23,7 @@ def cells_between(points, cells, size, centre, inner_radius, radius):  # type: i
         farther than its size outside `radius`.
     """
     corners, d = cells.shape[1], points.shape[1]
-    chosen = np.empty(len(cells), np.int64)
+    ring_cells = np.empty(len(cells), np.int64)
     count = 0
     for e in range(len(cells)):
         farthest_square, square_of_point = 0.0, 0.0
@@ -41,9 +41,9 @@ def cells_between(points, cells, size, centre, inner_radius, radius):  # type: i
             farthest_square = max(farthest_square, square)
         if math.sqrt(farthest_square) <= inner_radius:
             continue
-        chosen[count] = e
+        ring_cells[count] = e
         count += 1
-    return chosen[:count]
+    return ring_cells[:count]
 
 
 @kernel
@@ -107,16 +107,16 @@ def _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend):  # type: ignore[no-unt
 
 
 @kernel
-def _into_frame(frame, tensor, turn, local):  # type: ignore[no-untyped-def]
+def _into_frame(frame, tensor, turn, local_tensor):  # type: ignore[no-untyped-def]
     """Components along the rows of a frame of a tensor less another one; (2, 2, s)."""
     for state in range(tensor.shape[2]):
         a, b = tensor[0, 0, state] - turn[0, 0, state], tensor[0, 1, state] - turn[0, 1, state]
         c, d = tensor[1, 0, state] - turn[1, 0, state], tensor[1, 1, state] - turn[1, 1, state]
         for i in range(2):
-            first = frame[i, 0] * a + frame[i, 1] * c
-            second = frame[i, 0] * b + frame[i, 1] * d
+            row_0 = frame[i, 0] * a + frame[i, 1] * c
+            row_1 = frame[i, 0] * b + frame[i, 1] * d
             for j in range(2):
-                local[i, j, state] = first * frame[j, 0] + second * frame[j, 1]
+                local_tensor[i, j, state] = row_0 * frame[j, 0] + row_1 * frame[j, 1]
 
 
 @kernel
@@ -139,20 +139,20 @@ def _place(frame, dx, dy, side, is_behind):  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_point(  # type: ignore[no-untyped-def]
-    total, local, dx, dy, side, is_behind, weight, radii, inner, frame, modes, kolosov, lam, mu, g,
+    total, du, dx, dy, side, is_behind, weight, radii, r_inner, frame, modes, kolosov, lam, mu, g,
     sigma, fall,
 ):  # fmt: skip
-    """Add what one point contributes; local: gradients in the frame, dx and dy from the tip."""
+    """Add what one point contributes; du: gradients of u in the frame, dx and dy from the tip."""
     r, x, y, c, s = _place(frame, dx, dy, side, is_behind)
     _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
     for k in range(len(radii)):
-        width = radii[k] - inner[k]
-        z = min(max((r - inner[k]) / width, 0.0), 1.0)
+        width = radii[k] - r_inner[k]
+        z = min(max((r - r_inner[k]) / width, 0.0), 1.0)
         fall[k] = -30.0 * weight * (z * (1.0 - z)) ** 2 / (width * r)
-    for state in range(local.shape[2]):
-        a, b = local[0, 0, state], local[1, 0, state]
-        stress_across = lam * a + (lam + 2.0 * mu) * local[1, 1, state]
-        shear = mu * (local[0, 1, state] + b)
+    for state in range(du.shape[2]):
+        a, b = du[0, 0, state], du[1, 0, state]
+        stress_across = lam * a + (lam + 2.0 * mu) * du[1, 1, state]
+        shear = mu * (du[0, 1, state] + b)
         for m in range(3):
             # P_11 and P_12 of P_kj t_k, t along the first axis.
             flux = x * (
@@ -173,7 +173,7 @@ def _add_point(  # type: ignore[no-untyped-def]
 
 @kernel
 def _add_change(  # type: ignore[no-untyped-def]
-    total, local, dx, dy, side, is_behind, weight, radii, inner, frame, modes, kolosov, mu, g, fall,
+    total, du, dx, dy, side, is_behind, weight, radii, r_inner, frame, modes, kolosov, mu, g, fall,
     change, bend,
 ):  # fmt: skip
     """Add what the change of the stiffness from that of the tip (3, 3) contributes at a point.
@@ -182,9 +182,9 @@ def _add_change(  # type: ignore[no-untyped-def]
     """
     r, x, y, c, s = _place(frame, dx, dy, side, is_behind)
     _unit_bends(r, x, y, c, s, modes, kolosov, mu, bend)
-    for state in range(local.shape[2]):
-        e0, e1 = local[0, 0, state], local[1, 1, state]
-        e2 = local[0, 1, state] + local[1, 0, state]
+    for state in range(du.shape[2]):
+        e0, e1 = du[0, 0, state], du[1, 1, state]
+        e2 = du[0, 1, state] + du[1, 0, state]
         s00 = change[0, 0] * e0 + change[0, 1] * e1 + change[0, 2] * e2
         s11 = change[1, 0] * e0 + change[1, 1] * e1 + change[1, 2] * e2
         s01 = change[2, 0] * e0 + change[2, 1] * e1 + change[2, 2] * e2
@@ -194,14 +194,14 @@ def _add_change(  # type: ignore[no-untyped-def]
             stress_term = s00 * bend[m, 0, 0] + s11 * bend[m, 1, 1]
             stress_term += s01 * (bend[m, 0, 1] + bend[m, 1, 0])
             for k in range(len(radii)):
-                z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
+                z = min(max((r - r_inner[k]) / (radii[k] - r_inner[k]), 0.0), 1.0)
                 q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
                 total[state, k, m] += fall[k] * flux + weight * q * stress_term
 
 
 @kernel
 def add_points(  # type: ignore[no-untyped-def]
-    total, gradient, cell, bary, side, weight, points, cells, psi, tip, turn, radii, inner, frame,
+    total, gradient, cell, bary, side, weight, points, cells, psi, tip, turn, radii, r_inner, frame,
     modes, kolosov, lam, mu, change,
 ):  # fmt: skip
     """Add the domain integrals of modes I, II and of the point force over points.
@@ -224,8 +224,8 @@ def add_points(  # type: ignore[no-untyped-def]
     tip : (2,) array, length
     turn : (2, 2, s) array
         Mean rotation, subtracted from the gradients.
-    radii, inner : (k,) arrays, length
-        q falls from one to zero by a quintic between inner and radii.
+    radii, r_inner : (k,) arrays, length
+        q falls from one to zero by a quintic between r_inner and radii.
     frame : (2, 2) array
     modes : (2, 2, 4) array
         Displacements of modes I and II by tip function.
@@ -235,10 +235,10 @@ def add_points(  # type: ignore[no-untyped-def]
         within the inner radius count too. None is compiled for itself.
     """
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
-    local, bend = np.empty((2, 2, total.shape[0])), np.empty((3, 2, 2))
-    largest_radius, least_radius = radii[0], inner[0]
+    du, bend = np.empty((2, 2, total.shape[0])), np.empty((3, 2, 2))
+    largest_radius, least_radius = radii[0], r_inner[0]
     for k in range(1, len(radii)):
-        largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, inner[k])
+        largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, r_inner[k])
     if change is not None:
         least_radius = 0.0
     for p in range(len(weight)):
@@ -249,22 +249,22 @@ def add_points(  # type: ignore[no-untyped-def]
             dy += bary[p, b] * points[node, 1]
             psi_sum += psi[node]
         if least_radius * least_radius < dx * dx + dy * dy < largest_radius * largest_radius:
-            _into_frame(frame, gradient[p], turn, local)
+            _into_frame(frame, gradient[p], turn, du)
             _add_point(
-                total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame, modes,
+                total, du, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, r_inner, frame, modes,
                 kolosov, lam, mu, g, sigma, fall,
             )  # fmt: skip
             if change is not None:
                 _add_change(
-                    total, local, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, inner, frame,
+                    total, du, dx, dy, side[p], psi_sum < 0.0, weight[p], radii, r_inner, frame,
                     modes, kolosov, mu, g, fall, change[p], bend,
                 )  # fmt: skip
 
 
 @kernel
 def add_plain_cells(  # type: ignore[no-untyped-def]
-    total, chosen, points, cells, slopes, volume, nodes, edges, coefficients, side, psi, bary,
-    share, tip, turn, radii, inner, frame, modes, kolosov, lam, mu, change,
+    total, ring_cells, points, cells, slopes, volume, nodes, edges, coefficients, side, psi, bary,
+    share, tip, turn, radii, r_inner, frame, modes, kolosov, lam, mu, change,
 ):  # fmt: skip
     """Add the domain integrals over plain cells: places, gradients and terms in one pass.
 
@@ -272,11 +272,11 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    total, tip, turn, radii, inner, frame, modes, kolosov, lam, mu
+    total, tip, turn, radii, r_inner, frame, modes, kolosov, lam, mu
         As of `add_points`.
     change : (k, q or 1, 3, 3) array or None
-        As of `add_points`, of the chosen cells: at their points, or the same at all of them.
-    chosen : (k,) array of int
+        As of `add_points`, of the cells of the ring: at their points, or the same at all of them.
+    ring_cells : (k,) array of int
         Cells on which no enriched function acts.
     points, cells : (n, 2) and (m, 3) arrays
     slopes : (m, 3, 2) array
@@ -295,14 +295,14 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
     states = total.shape[0]
     g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
     gradient, corner = np.empty((2, 2, states)), np.empty((3, 2, 2, states))
-    local, bend = np.empty((2, 2, states)), np.empty((3, 2, 2))
-    largest_radius, least_radius = radii[0], inner[0]
+    du, bend = np.empty((2, 2, states)), np.empty((3, 2, 2))
+    largest_radius, least_radius = radii[0], r_inner[0]
     for k in range(1, len(radii)):
-        largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, inner[k])
+        largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, r_inner[k])
     if change is not None:
         least_radius = 0.0
-    for place in range(len(chosen)):
-        e = chosen[place]
+    for place in range(len(ring_cells)):
+        e = ring_cells[place]
         is_behind = psi[cells[e, 0]] + psi[cells[e, 1]] + psi[cells[e, 2]] < 0.0
         for b in range(3):
             for i in range(2):
@@ -314,11 +314,11 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
                         gradient[i, 0, s] += slopes[e, a, 0] * u
                         gradient[i, 1, s] += slopes[e, a, 1] * u
                     for k in range(len(edges)):
-                        other = edges[k, 0] + edges[k, 1] - b
+                        other_corner = edges[k, 0] + edges[k, 1] - b
                         if edges[k, 0] == b or edges[k, 1] == b:
                             u = 4.0 * coefficients[nodes[e, 3 + k], i, s]
-                            gradient[i, 0, s] += slopes[e, other, 0] * u
-                            gradient[i, 1, s] += slopes[e, other, 1] * u
+                            gradient[i, 0, s] += slopes[e, other_corner, 0] * u
+                            gradient[i, 1, s] += slopes[e, other_corner, 1] * u
             _into_frame(frame, gradient, turn, corner[b])
         for p in range(len(share)):
             dx, dy = -tip[0], -tip[1]
@@ -334,18 +334,18 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
             for i in range(2):
                 for j in range(2):
                     for s in range(states):
-                        local[i, j, s] = (
+                        du[i, j, s] = (
                             bary[p, 0] * corner[0, i, j, s]
                             + bary[p, 1] * corner[1, i, j, s]
                             + bary[p, 2] * corner[2, i, j, s]
                         )
             _add_point(
-                total, local, dx, dy, side[e], is_behind, share[p] * volume[e], radii, inner, frame,
+                total, du, dx, dy, side[e], is_behind, share[p] * volume[e], radii, r_inner, frame,
                 modes, kolosov, lam, mu, g, sigma, fall,
             )  # fmt: skip
             if change is not None:
                 _add_change(
-                    total, local, dx, dy, side[e], is_behind, share[p] * volume[e], radii, inner,
+                    total, du, dx, dy, side[e], is_behind, share[p] * volume[e], radii, r_inner,
                     frame, modes, kolosov, mu, g, fall,
                     change[place, min(p, change.shape[1] - 1)], bend,
                 )  # fmt: skip
@@ -353,14 +353,14 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
 
 @kernel
 def add_lips(  # type: ignore[no-untyped-def]
-    total, xi, outward_normal, side, weight, pressure, shear, gradient, steady, turn, radii, inner,
-    frame, modes, kolosov, lam, mu,
+    total, xi, outward_normal, side, weight, pressure, shear, gradient, steady, turn, radii,
+    r_inner, frame, modes, kolosov, lam, mu,
 ):  # fmt: skip
     """Add the full lip term of each state, domain and field.
 
     Parameters
     ----------
-    total, turn, radii, inner, frame, modes, kolosov, lam, mu
+    total, turn, radii, r_inner, frame, modes, kolosov, lam, mu
         As of `add_points`.
     xi : (n, 2) array, length
         Places from the tip, in its frame.
@@ -382,7 +382,7 @@ def add_lips(  # type: ignore[no-untyped-def]
     g, sigma, no_turn = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.zeros((2, 2))
     no_turn[0, 0] = no_turn[1, 1] = 1.0
     states, n = total.shape[0], len(xi)
-    local = np.empty((2, 2, states))
+    du = np.empty((2, 2, states))
     for p in range(n):
         for face in range(2):
             sign = 1.0 - 2.0 * face
@@ -390,7 +390,7 @@ def add_lips(  # type: ignore[no-untyped-def]
             r, _, _, c, s = _place(no_turn, xi[p, 0], xi[p, 1], side[face, p], True)
             _unit_fields(r, c, s, modes, kolosov, lam, mu, g, sigma)
             if len(gradient) > 0:
-                _into_frame(frame, gradient[face * n + p], turn, local)
+                _into_frame(frame, gradient[face * n + p], turn, du)
             for state in range(states):
                 t0, t1 = -pressure[state, p] * n0, -pressure[state, p] * n1
                 if len(shear) > 0:
@@ -400,8 +400,8 @@ def add_lips(  # type: ignore[no-untyped-def]
                 for m in range(3):
                     density = t0 * g[m, 0, 0] + t1 * g[m, 1, 0]
                     if len(gradient) > 0:
-                        a, b = local[0, 0, state], local[1, 0, state]
-                        e, f = local[0, 1, state], local[1, 1, state]
+                        a, b = du[0, 0, state], du[1, 0, state]
+                        e, f = du[0, 1, state], du[1, 1, state]
                         density += (sigma[m, 0, 0] * n0 + sigma[m, 0, 1] * n1) * a
                         density += (sigma[m, 1, 0] * n0 + sigma[m, 1, 1] * n1) * b
                         trace, slide = lam * (a + f), mu * (e + b)
@@ -411,6 +411,6 @@ def add_lips(  # type: ignore[no-untyped-def]
                         power += (trace + 2.0 * mu * f + steady[state, 1, 1]) * g[m, 1, 1]
                         density -= power * n0
                     for k in range(len(radii)):
-                        z = min(max((r - inner[k]) / (radii[k] - inner[k]), 0.0), 1.0)
+                        z = min(max((r - r_inner[k]) / (radii[k] - r_inner[k]), 0.0), 1.0)
                         q = 1.0 - z * z * z * (10.0 - 15.0 * z + 6.0 * z * z)
                         total[state, k, m] -= q * weight[p] * density
