@@ -122,13 +122,13 @@ class Whole(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> int:
         """The number as int."""
-        low, high = self.least, self.most
+        n_min, n_max = self.least, self.most
         try:
-            return whole_number(value, what, least=low, most=high, error=error)
+            return whole_number(value, what, least=n_min, most=n_max, error=error)
         except error:
-            if low is None or high is None or high - low > _FEW:
+            if n_min is None or n_max is None or n_max - n_min > _FEW:
                 raise
-            choices = " or ".join(map(str, range(low, high + 1)))
+            choices = " or ".join(map(str, range(n_min, n_max + 1)))
             raise error(f"{what} = {value_text(value)}: give {choices}.") from None
 
     @property
@@ -146,17 +146,17 @@ class Choice(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The value as it is."""
-        if not self.needs and all(isinstance(each, str) for each in self.values):
+        if not self.needs and all(isinstance(choice, str) for choice in self.values):
             return one_of(value, what, self.values, error=error)
-        if not any(type(value) is type(each) and value == each for each in self.values):
-            choices = self.needs or " or ".join(repr(each) for each in self.values)
+        if not any(type(value) is type(choice) and value == choice for choice in self.values):
+            choices = self.needs or " or ".join(repr(choice) for choice in self.values)
             raise error(f"{what} = {value_text(value)}: give {choices}.")
         return value
 
     @property
     def words(self) -> str:
         """The values."""
-        return "{" + ", ".join(repr(each) for each in self.values) + "}"
+        return "{" + ", ".join(repr(choice) for choice in self.values) + "}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -287,10 +287,10 @@ class Interval(Rule):
 
     def check(self, value: Any, what: str, error: Error) -> tuple[float, float]:
         """Both as float."""
-        low, high = numbers(value, what, (2,), error=error).tolist()
-        if not low < high:
-            raise error(f"{what} = ({low:g}, {high:g}): give (lowest, highest).")
-        return low, high
+        x_min, x_max = numbers(value, what, (2,), error=error).tolist()
+        if not x_min < x_max:
+            raise error(f"{what} = ({x_min:g}, {x_max:g}): give (lowest, highest).")
+        return x_min, x_max
 
 
 @dataclass(frozen=True, repr=False)
@@ -407,23 +407,23 @@ class Function(Rule):
 class Either(Rule):
     """What fits one of two rules; the message is that of the second."""
 
-    first: Rule
-    second: Rule
+    first_rule: Rule
+    second_rule: Rule
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "unit", self.second.unit)
+        object.__setattr__(self, "unit", self.second_rule.unit)
 
     def check(self, value: Any, what: str, error: Error) -> Any:
         """The value as the rule that it fits keeps it."""
         try:
-            return self.first.check(value, what, error)
+            return self.first_rule.check(value, what, error)
         except error:
-            return self.second.check(value, what, error)
+            return self.second_rule.check(value, what, error)
 
     @property
     def words(self) -> str:
         """Both rules."""
-        return f"{self.first}, or {self.second}"
+        return f"{self.first_rule}, or {self.second_rule}"
 
 
 @dataclass(frozen=True)
@@ -496,7 +496,7 @@ def _argument(name: str, hint: Any, default: Any) -> Argument:
     rule: Rule | None = None
     is_optional = default is None
     if get_origin(hint) in (Union, UnionType):  # such as Length | None
-        rules = [one for one in get_args(hint) if get_origin(one) is Annotated]
+        rules = [part_hint for part_hint in get_args(hint) if get_origin(part_hint) is Annotated]
         if len(rules) == 1:
             is_optional = is_optional or NoneType in get_args(hint)
             (hint,) = rules
@@ -568,10 +568,8 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
 
         @cache
         def rules() -> dict[str, tuple[Argument, str]]:  # hints may name what is defined later
-            every = arguments_of(function).items()
-            return {
-                name: (one, f"{function.__qualname__}: {name}") for name, one in every if one.rule
-            }
+            pairs = arguments_of(function).items()
+            return {name: (a, f"{function.__qualname__}: {name}") for name, a in pairs if a.rule}
 
         @wraps(function)
         def run(*values: P.args, **keyword_values: P.kwargs) -> T:
@@ -598,7 +596,7 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
 
 def without_types(signature: inspect.Signature) -> inspect.Signature:
     """What help shows: names and defaults, for the docstring says types in words."""
-    parameters = [one.replace(annotation=one.empty) for one in signature.parameters.values()]
+    parameters = [p.replace(annotation=p.empty) for p in signature.parameters.values()]
     return signature.replace(parameters=parameters, return_annotation=signature.empty)
 
 
@@ -637,19 +635,19 @@ def kinds_of(base: type) -> dict[str, type]:
 
 
 def _bounds(above: Any, least: Any, below: Any, most: Any) -> str:
-    low = f"above {above:g}" if above is not None else ""
-    low = f"at least {least:g}" if least is not None else low
-    high = f"below {below:g}" if below is not None else ""
-    high = f"at most {most:g}" if most is not None and most < LARGEST else high
-    return " and ".join(part for part in (low, high) if part)
+    lower_bound = f"above {above:g}" if above is not None else ""
+    lower_bound = f"at least {least:g}" if least is not None else lower_bound
+    upper_bound = f"below {below:g}" if below is not None else ""
+    upper_bound = f"at most {most:g}" if most is not None and most < LARGEST else upper_bound
+    return " and ".join(part for part in (lower_bound, upper_bound) if part)
 
 
 def classes_of(kind: Any) -> dict[str, type]:
     """Classes that a value may be of, by name: those derived from a base, or the class itself."""
     kinds: tuple[Any, ...] = get_args(kind) or (kind if isinstance(kind, tuple) else (kind,))
     result: dict[str, type] = {}
-    for one in kinds:
-        result |= kinds_of(one) or {one.__name__: one}
+    for part_kind in kinds:
+        result |= kinds_of(part_kind) or {part_kind.__name__: part_kind}
     return result
 
 
@@ -666,7 +664,7 @@ def _shape_words(shape: tuple[int | None, ...] | None) -> str:
 
 
 def _tuples(value: Any) -> Any:
-    return tuple(_tuples(each) for each in value) if isinstance(value, list) else value
+    return tuple(_tuples(entry) for entry in value) if isinstance(value, list) else value
 
 
 # Arguments that many functions have.

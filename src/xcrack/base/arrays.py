@@ -31,8 +31,8 @@ def has_shape(shape: tuple[int, ...], pattern: Shape | None) -> bool:
         return True
     if len(shape) != len(pattern):
         return False
-    for side, other in zip(shape, pattern):
-        if other is not None and side != other:
+    for side, pattern_side in zip(shape, pattern):
+        if pattern_side is not None and side != pattern_side:
             return False
     return True
 

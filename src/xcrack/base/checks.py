@@ -178,9 +178,9 @@ def numbers(
         _check_shape(value, what, shape, expectation, error)
     result: Floats = value
     if must_be_finite and not np.isfinite(result).all():
-        where = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
-        place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in where)}]"
-        raise error(f"{what}{place} = {result[where]}: every number must be finite.")
+        index = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
+        place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in index)}]"
+        raise error(f"{what}{place} = {result[index]}: every number must be finite.")
     return result
 
 
@@ -334,7 +334,7 @@ def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -
     return tuple(items)
 
 
-def unchecked(kind: type[T], **fields: Any) -> T:
+def build_without_checks(kind: type[T], **fields: Any) -> T:
     """A frozen dataclass of fields that are sound by their making: none is checked.
 
     Parameters
@@ -353,7 +353,7 @@ def unchecked(kind: type[T], **fields: Any) -> T:
     return result
 
 
-def unchecked_copy(value: T, **fields: Any) -> T:
+def copy_without_checks(value: T, **fields: Any) -> T:
     """A frozen dataclass with other fields, that are sound by their making: none is checked again.
 
     Parameters
@@ -451,11 +451,11 @@ def _of_shape(shape: Shape | None) -> str:
 def _bounds(
     above: float | None, least: float | None, below: float | None, most: float | None
 ) -> str:
-    low = f"above {above:g}" if above is not None else ""
-    low = f"of at least {least:g}" if least is not None else low
-    high = f"below {below:g}" if below is not None else ""
-    high = f"of at most {most:g}" if most is not None else high
-    text = " and ".join(part for part in (low, high) if part)
+    lower_bound = f"above {above:g}" if above is not None else ""
+    lower_bound = f"of at least {least:g}" if least is not None else lower_bound
+    upper_bound = f"below {below:g}" if below is not None else ""
+    upper_bound = f"of at most {most:g}" if most is not None else upper_bound
+    text = " and ".join(part for part in (lower_bound, upper_bound) if part)
     return f" {text}" if text else ""
 
 
@@ -486,10 +486,10 @@ def values_by_set(
             f"{what}: {value_text(entry)}: give a mapping of cell sets to {values}, such as "
             f'{{"plate": {maker}(...), "weld": {maker}(...)}}.'
         )
-    for name, each in pairs:
-        if not isinstance(name, str) or not is_value(each):
+    for name, v in pairs:
+        if not isinstance(name, str) or not is_value(v):
             raise ProblemError(
-                f"{what}: {value_text(name)}: {value_text(each)}: give the name of a cell set, and "
+                f"{what}: {value_text(name)}: {value_text(v)}: give the name of a cell set, and "
                 f"{value}."
             )
     return tuple(pairs)

@@ -107,8 +107,8 @@ def names_read(function: types.FunctionType) -> Iterator[tuple[str, Any]]:
 
 
 def _names(code: types.CodeType) -> set[str]:
-    inner = (c for c in code.co_consts if isinstance(c, types.CodeType))
-    return set(code.co_names).union(*map(_names, inner))
+    inner_codes = (c for c in code.co_consts if isinstance(c, types.CodeType))
+    return set(code.co_names).union(*map(_names, inner_codes))
 
 
 def methods(kind: type) -> Iterator[tuple[str, types.FunctionType]]:
@@ -185,7 +185,7 @@ class Description:
         if id(value) in owners:
             self.lines[name] = "itself"
             return
-        inner = (*owners, id(value))
+        inner_owners = (*owners, id(value))
         if isinstance(value, np.generic):
             value = value.item()
         inner_function = wrapped_by(value)
@@ -199,22 +199,22 @@ class Description:
             digest = f"{value.dtype} {value.shape} {_hash(content.tobytes())}"
             self.lines[name] = text if text and len(text) <= _LONG else digest
         elif isinstance(value, types.FunctionType):
-            self._add_function(name, value, inner, is_used)
+            self._add_function(name, value, inner_owners, is_used)
         elif isinstance(value, types.MethodType):
-            self.add(name, value.__func__, inner, is_used)
-            self.add(f"{name}.self", value.__self__, inner, is_used)
+            self.add(name, value.__func__, inner_owners, is_used)
+            self.add(f"{name}.self", value.__self__, inner_owners, is_used)
         elif isinstance(value, partial):
-            self.add(name, value.func, inner, is_used)
-            self.add(f"{name}.args", value.args, inner, is_used)
-            self.add(f"{name}.keywords", value.keywords, inner, is_used)
+            self.add(name, value.func, inner_owners, is_used)
+            self.add(f"{name}.args", value.args, inner_owners, is_used)
+            self.add(f"{name}.keywords", value.keywords, inner_owners, is_used)
         elif isinstance(value, Mapping | tuple | list | set | frozenset):
-            self._add_container(name, value, inner, is_used)
+            self._add_container(name, value, inner_owners, is_used)
         elif isinstance(value, _NAMED):
-            self._add_named(name, value, inner)
+            self._add_named(name, value, inner_owners)
         elif is_dataclass(value):
-            self._add_dataclass(name, value, inner, is_used)
+            self._add_dataclass(name, value, inner_owners, is_used)
         else:
-            self._add_object(name, value, inner, is_used)
+            self._add_object(name, value, inner_owners, is_used)
 
     def _add_container(self, name: str, value: Any, owners: tuple[int, ...], is_used: bool) -> None:
         self.lines[name] = f"{len(value)} entries"
@@ -411,7 +411,7 @@ def only_compiled_differently(
         for key in sorted({*old_lines} & {*new_lines})
         if old_lines[key] != new_lines[key]
     }
-    return [key for key, (one, other) in names.items() if one and other and one[1] == other[1]]
+    return [key for key, (m, n) in names.items() if m and n and m[1] == n[1]]
 
 
 __all__ = [

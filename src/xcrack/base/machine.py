@@ -137,8 +137,8 @@ class _Blas:
         import scipy.linalg  # noqa: F401 - so that its BLAS is among those that are found
         import threadpoolctl
 
-        every = threadpoolctl.ThreadpoolController().select(user_api="blas")
-        self.libraries = every.lib_controllers
+        blas_controller = threadpoolctl.ThreadpoolController().select(user_api="blas")
+        self.libraries = blas_controller.lib_controllers
         self.lock, self.users = Lock(), 0
         self.counts_before: list[int | None] = []
 

@@ -121,14 +121,14 @@ def sketch(points: Floats, boundary: Ints, cracks: Sequence[Floats]) -> Markup:
     view = _TOWARD[points.shape[1]]
     outline = points[boundary] if points.shape[1] < 3 else _box_of(points)
     projections = [segments @ view.T for segments in (outline, *cracks) if len(segments)]
-    every = np.concatenate([part.reshape(-1, 2) for part in projections])
-    low, high = every.min(axis=0), every.max(axis=0)
-    size = np.maximum(high - low, 1e-300)
+    all_points = np.concatenate([part.reshape(-1, 2) for part in projections])
+    x_min, x_max = all_points.min(axis=0), all_points.max(axis=0)
+    size = np.maximum(x_max - x_min, 1e-300)
     scale = min((_WIDTH - 2 * _MARGIN) / size[0], (_HEIGHT - 2 * _MARGIN) / size[1])
     width, height = size * scale + 2 * _MARGIN
     paths = []
     for number, part in enumerate(projections):
-        place = _MARGIN + (part - low) * scale
+        place = _MARGIN + (part - x_min) * scale
         place[..., 1] = height - place[..., 1]
         steps = "".join(f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in place)
         colour, line = (_BODY, 1.0) if number == 0 else (_CRACK, 2.0)
@@ -149,8 +149,8 @@ def rim(points: Floats, faces: Ints) -> Floats:
 
 
 def _box_of(points: Floats) -> Floats:
-    low, high = points.min(axis=0), points.max(axis=0)
-    corner = np.stack(np.meshgrid(*np.stack([low, high], 1), indexing="ij"), -1).reshape(-1, 3)
+    x_min, x_max = points.min(axis=0), points.max(axis=0)
+    corner = np.stack(np.meshgrid(*np.stack([x_min, x_max], 1), indexing="ij"), -1).reshape(-1, 3)
     pairs = [(i, i | bit) for bit in (1, 2, 4) for i in range(8) if not i & bit]
     return np.asarray(corner[np.array(pairs)])
 

@@ -69,7 +69,7 @@ class Units:
         if not (self.length and self.force):
             return ""
         size = _FORCES[self.force] / _LENGTHS[self.length] ** 2
-        return next((n for n, one in _STRESSES.items() if abs(one / size - 1) < _SAME), "")
+        return next((n for n, unit in _STRESSES.items() if abs(unit / size - 1) < _SAME), "")
 
     def number(self, text: str, dimension: Dimension) -> float:
         """A quantity as a number in these units.

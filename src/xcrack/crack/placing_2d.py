@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Floats, at, coordinates, lock
-from xcrack.base.checks import unchecked_copy
+from xcrack.base.checks import copy_without_checks
 from xcrack.base.errors import CoarseMeshError, GeometryError, warn
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.junctions import Junction, junctions
@@ -193,7 +193,7 @@ def vertices_on_mesh(crack: Crack, mesh: Mesh) -> Crack:
     end_numbers = {0, len(points) - 1} - set(crack.tips or ())  # mouths, and ends on other cracks
     for number in set(np.nonzero(is_close)[0].tolist()) - end_numbers:
         points[number] = _on_mesh(points[number], mesh)
-    return unchecked_copy(crack, points=lock(points))
+    return copy_without_checks(crack, points=lock(points))
 
 
 def _on_mesh(x: Floats, mesh: Mesh) -> Floats:

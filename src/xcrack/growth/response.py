@@ -14,7 +14,15 @@ from numpy.typing import ArrayLike
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Floats, lock
-from xcrack.base.checks import entries, flag, number, numbers, unchecked, unchecked_copy, value_text
+from xcrack.base.checks import (
+    build_without_checks,
+    copy_without_checks,
+    entries,
+    flag,
+    number,
+    numbers,
+    value_text,
+)
 from xcrack.base.errors import ProblemError
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem, check_problem
@@ -219,9 +227,11 @@ def respond(
     handed_on = new_solutions[0].reuse
     by_crack = [stress_intensities(new_solutions, c, bars) for c in range(len(problem.cracks))]
     light = handed_on.without_factor()
-    solutions = tuple(unchecked_copy(s, reuse=light, factored=None) for s in new_solutions)
+    solutions = tuple(copy_without_checks(s, reuse=light, factored=None) for s in new_solutions)
     sif = tuple(zip(*by_crack, strict=True))
-    return unchecked(Response, states=states, sif=sif, solutions=solutions, reuse=handed_on)
+    return build_without_checks(
+        Response, states=states, sif=sif, solutions=solutions, reuse=handed_on
+    )
 
 
 def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> Response:

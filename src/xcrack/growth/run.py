@@ -7,7 +7,7 @@ from typing import Unpack
 
 import numpy as np
 
-from xcrack.base.checks import unchecked, unchecked_copy
+from xcrack.base.checks import build_without_checks, copy_without_checks
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.measures import crack_size
 from xcrack.crack.meetings import LEAST
@@ -257,7 +257,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
                 first = _with_validity(rule, first)
-            last_step = unchecked_copy(first, warnings=tuple(messages))
+            last_step = copy_without_checks(first, warnings=tuple(messages))
             progress.step(last_step)
             yield last_step
         else:
@@ -296,7 +296,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
             # Not kept with the step: a run that is resumed does not know the energy before.
             if alarm := alarm_of_energy(rule, cut, next_step):
                 warn(str(alarm))
-            last_step = unchecked_copy(next_step, warnings=tuple(messages))
+            last_step = copy_without_checks(next_step, warnings=tuple(messages))
             progress.step(last_step)
             yield last_step
             if end:
@@ -439,13 +439,13 @@ def _cut_at_size(rule: GrowthRule, step: Step) -> Step:
 def _with_length(rule: GrowthRule, step: Step, length: float) -> Step:
     """A step with a shorter plan; the advance of its stations is reduced in proportion."""
     shorter_step = _with_plan(
-        rule, unchecked_copy(step, control=replace(step.control, length=length))
+        rule, copy_without_checks(step, control=replace(step.control, length=length))
     )
     plan, plan_before = plan_of(shorter_step), plan_of(step)
     share = plan.largest / plan_before.largest if plan_before.largest > 0 else 1.0
     if rule.integrator == "euler":  # it recognises its stations by that, to round-off
-        return unchecked_copy(shorter_step, da=split(plan.arc, [len(da) for da in step.da]))
-    return unchecked_copy(shorter_step, da=tuple(share * da for da in step.da))
+        return copy_without_checks(shorter_step, da=split(plan.arc, [len(da) for da in step.da]))
+    return copy_without_checks(shorter_step, da=tuple(share * da for da in step.da))
 
 
 def _refuse(step: Step, end: str) -> None:
@@ -467,7 +467,7 @@ def _with_validity(rule: GrowthRule, step: Step) -> Step:
     """A step with how far elasticity holds at it; warns of what is beyond its limit."""
     if not step.has_left:  # by the material alone: a K_c of the run only says where it ends
         K_c = rule.problem.elasticity.material.K_c
-        step = unchecked_copy(step, validity=validity_of(rule, step, K_c))
+        step = copy_without_checks(step, validity=validity_of(rule, step, K_c))
     for alarm in alarms_of_step(rule, step):
         warn(str(alarm))
     return step
@@ -508,7 +508,7 @@ def _step_after(
             rule, problem, last_step, reuse, run_state(last_step).settings, joins_of_step
         )
         arrivals = arrivals_of(rule, last_step, arrivals_ahead, step.cycles - last_step.cycles)
-        return unchecked_copy(step, arrivals=arrivals), reuse, ""
+        return copy_without_checks(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
         return None, reuse, cannot_go_on(last_step, error)
     except XcrackError as error:
@@ -566,7 +566,7 @@ def _solved_step(
         N = 0.0 if last_step is None else last_step.cycles + plan_of(last_step).cycles
         response = respond_under_program(rule, problem, reuse, rule.estimates, N)
     sif, solutions, handed_on = response.sif, response.solutions, response.reuse
-    rates = rates_of(rule, problem, unchecked_copy(response, sif=best_K(sif)))
+    rates = rates_of(rule, problem, copy_without_checks(response, sif=best_K(sif)))
     integrator = integrator_of(rule)
     if last_step is None:
         index, radius = 0, rule.problem.numerics.radius
@@ -586,12 +586,12 @@ def _solved_step(
                 break
             response = response.scaled(sqrt(change))  # half of it: fewer cycles, smaller loads
             sif, solutions = response.sif, response.solutions
-            rates = rates_of(rule, problem, unchecked_copy(response, sif=best_K(sif)))
+            rates = rates_of(rule, problem, copy_without_checks(response, sif=best_K(sif)))
             result = correct(rule, last_step, rates, identities)
     if rule.estimates:
         result = add_K_error(rule, last_step, result, rates, sif, is_foretold)
     states, levels = states_and_levels(rule.cycle, response)
-    step = unchecked(
+    step = build_without_checks(
         Step,
         index=index,
         cycles=result.cycles,
@@ -633,19 +633,19 @@ def _solved_step(
         )
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
-    return unchecked_copy(step, da=rates.split(da)), handed_on
+    return copy_without_checks(step, da=rates.split(da)), handed_on
 
 
 def _with_plan(rule: GrowthRule, step: Step) -> Step:
     """A step with the plan of what comes after it."""
     plan = integrator_of(rule).predict(rule, step)
-    step = unchecked_copy(step, plan=plan)
+    step = copy_without_checks(step, plan=plan)
     if plan.limit and (plan.limit != "geometry" or rule.problem.mesh.dim == 2):
         return step
     try:
-        return unchecked_copy(step, plan=with_joins(rule, step, plan))
+        return copy_without_checks(step, plan=with_joins(rule, step, plan))
     except GeometryError as error:
-        return unchecked_copy(step, plan=replace(plan, limit="geometry", refusal=str(error)))
+        return copy_without_checks(step, plan=replace(plan, limit="geometry", refusal=str(error)))
 
 
 def _identities(

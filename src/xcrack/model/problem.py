@@ -24,7 +24,7 @@ from xcrack.base.arguments import (
     Whole,
     check_arguments,
 )
-from xcrack.base.checks import entries, number, unchecked_copy, value_text
+from xcrack.base.checks import copy_without_checks, entries, number, value_text
 from xcrack.base.errors import CoarseMeshError, ProblemError, XcrackError
 from xcrack.base.markup import Markup, element, join_parts, rim, sketch, table
 from xcrack.crack.crack import Crack
@@ -443,10 +443,10 @@ def problem_with_cracks(
     """
     numerics = problem.numerics
     if radius is not None and radius != numerics.radius:
-        numerics = unchecked_copy(numerics, radius=radius)
+        numerics = copy_without_checks(numerics, radius=radius)
     if len(cracks) != len(problem.cracks):
         return replace(problem, cracks=tuple(cracks), numerics=numerics)
-    result = unchecked_copy(problem, cracks=tuple(cracks), numerics=numerics)
+    result = copy_without_checks(problem, cracks=tuple(cracks), numerics=numerics)
     vars(result)["elasticity"] = problem.elasticity
     return result
 

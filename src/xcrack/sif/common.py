@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.base.checks import unchecked_copy
+from xcrack.base.checks import copy_without_checks
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.locate import barycentric, cells_at
 from xcrack.model.material import Isotropic
@@ -205,7 +205,7 @@ def with_closed(sif: SIF, solution: Solution, c: int, size: float) -> SIF:
     at_rest = _at_rest(sif, solution, c, size)
     spread[at_rest] = np.maximum(spread[at_rest], np.abs(K[at_rest]))
     K[at_rest] = 0.0
-    return unchecked_copy(sif, K=K, spread=spread, closed=is_closed)
+    return copy_without_checks(sif, K=K, spread=spread, closed=is_closed)
 
 
 _REST = 1e-6  # slip over the largest displacement that is what solvers leave

@@ -8,7 +8,7 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints
-from xcrack.base.checks import unchecked
+from xcrack.base.checks import build_without_checks
 from xcrack.fem.assembly import Tabulated, tabulate_functions
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Circles, Points, cell_points
@@ -252,7 +252,7 @@ def intensity_at_tip(solutions: Sequence[Solution], t: int) -> tuple[list[SIF], 
     for solution, values in zip(solutions, _integrals(solutions, t, radii), strict=True):
         K = 0.5 * E_prime * values[:, :2]
         T = E_prime * values[0, 2] + constant_part(solution, t)
-        sif = unchecked(
+        sif = build_without_checks(
             SIF,
             x=tip.x[None],
             frame=tip.frame[None],

@@ -9,7 +9,7 @@ import numpy as np
 from xcrack.base import markup
 from xcrack.base.arguments import Number, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.base.checks import numbers, unchecked, value_text, whole_numbers
+from xcrack.base.checks import build_without_checks, numbers, value_text, whole_numbers
 from xcrack.base.errors import ProblemError
 from xcrack.base.optional import require_package
 
@@ -361,7 +361,7 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
             return None
         return lock(np.concatenate([np.zeros((0, *shape)), *given_values]))
 
-    return unchecked(
+    return build_without_checks(
         SIF,
         x=rows("x", dim),
         frame=rows("frame", dim, dim),

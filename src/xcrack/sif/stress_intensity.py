@@ -8,7 +8,7 @@ import numpy as np
 from xcrack.analysis.solution import Solution
 from xcrack.base.arguments import Choice, Either, Flag, Whole, check_arguments
 from xcrack.base.arrays import Floats
-from xcrack.base.checks import unchecked_copy, value_text
+from xcrack.base.checks import copy_without_checks, value_text
 from xcrack.base.errors import ProblemError
 from xcrack.base.machine import threads
 from xcrack.model.material import Material
@@ -144,7 +144,7 @@ def stress_intensities(
 def _without_K(sif: SIF) -> SIF:
     """K of a state in which nothing acts."""
     K, T = np.zeros_like(sif.K), np.where(np.isnan(sif.T), np.nan, 0.0)
-    return unchecked_copy(sif, K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
+    return copy_without_checks(sif, K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
 
 
 def _checked_solutions(solutions: Any) -> list[Solution]:

@@ -88,9 +88,9 @@ class _Flags(Flags):
     def __hash__(self) -> int:
         return _FLAGS_HASH
 
-    def __eq__(self, other: object) -> bool:
-        return self is other or (
-            isinstance(other, Flags) and (self._values == other._values or super().__eq__(other))
+    def __eq__(self, flags: object) -> bool:
+        return self is flags or (
+            isinstance(flags, Flags) and (self._values == flags._values or super().__eq__(flags))
         )
 
 
@@ -123,11 +123,11 @@ class _Kernel(CompilerBase):
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         left_out = set(_NOT_NEEDED)
-        for each, text in DefaultPassBuilder.define_nopython_pipeline(state).passes:
-            if each.__name__ not in left_out:
-                passes.add_pass(self.lowering if each is NativeLowering else each, text)
-            if each.__name__ == "DeadBranchPrune":  # once: where an argument is None
-                left_out.add(each.__name__)
+        for pass_class, text in DefaultPassBuilder.define_nopython_pipeline(state).passes:
+            if pass_class.__name__ not in left_out:
+                passes.add_pass(self.lowering if pass_class is NativeLowering else pass_class, text)
+            if pass_class.__name__ == "DeadBranchPrune":  # once: where an argument is None
+                left_out.add(pass_class.__name__)
         passes.finalize()
         return [passes]
 
@@ -199,7 +199,7 @@ def _of_types(get_call_template: Callable[..., Any]) -> Callable[..., Any]:
 
     def without_values(args: Any, kws: Any) -> Any:
         types = {name: numba.types.unliteral(value) for name, value in kws.items()}
-        return get_call_template(tuple(numba.types.unliteral(each) for each in args), types)
+        return get_call_template(tuple(numba.types.unliteral(t) for t in args), types)
 
     return without_values
 

@@ -19,7 +19,7 @@ def _rows_of(count: int) -> Any:
     """A function that writes y + scale A x for some rows that are stored side by side."""
 
     @intrinsic
-    def rows(typing, columns, values, x, y, scale, out, low, high, place, row):  # type: ignore[no-untyped-def]
+    def rows(typing, columns, values, x, y, scale, out, start, stop, place, row):  # type: ignore[no-untyped-def]
         del typing
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -27,7 +27,7 @@ def _rows_of(count: int) -> Any:
                 context.make_array(signature.args[k])(context, builder, arguments[k]).data
                 for k in (0, 1, 2, 3, 5)
             )
-            scale, (low, high, place, row) = arguments[4], arguments[6:]
+            scale, (start, stop, place, row) = arguments[4], arguments[6:]
             scalar_type = value.type.pointee
             vector = ir.VectorType(scalar_type, WIDTH)
             nothing, alignment = (
@@ -37,8 +37,8 @@ def _rows_of(count: int) -> Any:
             first_lane = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
 
             def spread(number: Any) -> Any:
-                one = builder.insert_element(nothing, number, ir.IntType(32)(0))
-                return builder.shuffle_vector(one, nothing, first_lane)
+                lane = builder.insert_element(nothing, number, ir.IntType(32)(0))
+                return builder.shuffle_vector(lane, nothing, first_lane)
 
             def load_four(pointer: Any, number: Any) -> Any:
                 first = builder.gep(pointer, [builder.mul(number, _SIZE(WIDTH))])
@@ -48,20 +48,20 @@ def _rows_of(count: int) -> Any:
                 return builder.load(load_four(pointer, number), align=alignment)
 
             sums = [cgutils.alloca_once(builder, vector) for _ in range(count)]
-            for each in sums:
-                builder.store(ir.Constant(vector, [0.0] * WIDTH), each)
+            for sum_pointer in sums:
+                builder.store(ir.Constant(vector, [0.0] * WIDTH), sum_pointer)
             at = cgutils.alloca_once_value(builder, place)
-            with cgutils.for_range_slice(builder, low, high, _SIZE(1)) as (k, _):
+            with cgutils.for_range_slice(builder, start, stop, _SIZE(1)) as (k, _):
                 number = builder.zext(builder.load(builder.gep(column, [k])), _SIZE)
                 xk, p = load_vector(x, number), builder.load(at)
-                for i, each in enumerate(sums):
+                for i, sum_pointer in enumerate(sums):
                     row_pointer = builder.load(builder.gep(value, [builder.add(p, _SIZE(i))]))
                     term = builder.fmul(spread(row_pointer), xk)
-                    builder.store(builder.fadd(builder.load(each), term), each)
+                    builder.store(builder.fadd(builder.load(sum_pointer), term), sum_pointer)
                 builder.store(builder.add(p, _SIZE(count)), at)
-            for i, each in enumerate(sums):
+            for i, sum_pointer in enumerate(sums):
                 number = builder.add(row, _SIZE(i))
-                term = builder.fmul(spread(scale), builder.load(each))
+                term = builder.fmul(spread(scale), builder.load(sum_pointer))
                 total = builder.fadd(load_vector(y, number), term)
                 builder.store(total, load_four(out, number), align=alignment)
             return context.get_dummy_value()
@@ -73,10 +73,10 @@ def _rows_of(count: int) -> Any:
 
 
 def _in_python(count: int) -> Any:
-    def rows(columns, values, x, y, scale, out, low, high, place, row):  # type: ignore[no-untyped-def]
-        stretch = values[place : place + count * (high - low)].reshape(high - low, count)
+    def rows(columns, values, x, y, scale, out, start, stop, place, row):  # type: ignore[no-untyped-def]
+        stretch = values[place : place + count * (stop - start)].reshape(stop - start, count)
         for i in range(count):
-            total = (stretch[:, i, None] * x[columns[low:high]]).cumsum(axis=0)[-1:].sum(axis=0)
+            total = (stretch[:, i, None] * x[columns[start:stop]]).cumsum(axis=0)[-1:].sum(axis=0)
             out[row + i] = y[row + i] + scale * total
 
     return rows
