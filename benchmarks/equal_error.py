@@ -80,10 +80,10 @@ def _process(checkout: Path) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def _asked(process: subprocess.Popen[str], *what: Any) -> dict[str, float]:
+def _asked(process: subprocess.Popen[str], *label: Any) -> dict[str, float]:
     assert process.stdin is not None
     assert process.stdout is not None
-    process.stdin.write(json.dumps(what) + "\n")
+    process.stdin.write(json.dumps(label) + "\n")
     process.stdin.flush()
     return dict(json.loads(process.stdout.readline()))
 

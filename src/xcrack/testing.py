@@ -173,7 +173,7 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, faults: list[str])
     }
     if at_closed is not None:
         same_modes["a state with K_I < 0 instead of 0"] = (negative_K, at_closed)
-    for what, (changed_K, expected_answer) in same_modes.items():
+    for label, (changed_K, expected_answer) in same_modes.items():
         answer = _answer_of(criterion, changed_K, nu, faults)
         if answer is None:
             return
@@ -181,7 +181,7 @@ def _check_modes(criterion: Criterion, nu: float, modes: int, faults: list[str])
             if not np.allclose(value, expected_value, rtol=_ROUND_OFF, atol=_ROUND_OFF):
                 i = int(np.argmax(np.abs(value - expected_value)))
                 faults.append(
-                    f"{what}: {name} is {value[i]:.6g}, it should be {expected_value[i]:.6g}"
+                    f"{label}: {name} is {value[i]:.6g}, it should be {expected_value[i]:.6g}"
                 )
 
 

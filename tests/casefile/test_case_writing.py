@@ -34,10 +34,10 @@ ARGUMENTS = {
 FUNCTION, UNSOLVED, BODILESS = "a function of the place", "nothing is solved", "no body"
 
 
-def listed(what: str) -> dict[str, str]:
+def listed(label: str) -> dict[str, str]:
     """Kind of each scene on the page, by its name: rows of a table."""
     page = (TOP / "docs" / "verification.md").read_text(encoding="utf-8")
-    part = page.split(f"### {HEADING[what]}")[1].split("\n#")[0]
+    part = page.split(f"### {HEADING[label]}")[1].split("\n#")[0]
     rows = [row.strip("|").split("|") for row in part.splitlines() if row.startswith("|")][2:]
     return {
         name: kind.strip() for kind, names in rows for name in re.findall(r"`([\w.-]+)`", names)

@@ -419,8 +419,8 @@ def test_inverted_cells_are_turned_not_refused():
     assert (mesh.volume > 0).all()
 
 
-@pytest.mark.parametrize("what", ["numerics", "problem", "solve", "line_crack", "fix"])
-def test_unknown_options_are_refused_by_name(what):
+@pytest.mark.parametrize("label", ["numerics", "problem", "solve", "line_crack", "fix"])
+def test_unknown_options_are_refused_by_name(label):
     """A misspelt keyword must not pass: Python's own TypeError names it."""
     calls = {
         "numerics": lambda: xc.Numerics(radios=1.0),
@@ -430,7 +430,7 @@ def test_unknown_options_are_refused_by_name(what):
         "fix": lambda: xc.fix("top", axes=1),
     }
     with pytest.raises(TypeError, match="unexpected keyword argument"):
-        calls[what]()
+        calls[label]()
 
 
 def test_unknown_names_of_the_package():

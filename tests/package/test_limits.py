@@ -55,12 +55,12 @@ def stored_names(nodes):
 
 
 def bare_words():
-    """Words of `bare_words.txt`: gone, in use, and `{word: files}` of those with a reason."""
+    """Words of `bare_words.txt`: all of them, and `{word: files}` of those with a reason."""
     text = Path(__file__).with_name("bare_words.txt").read_text(encoding="utf-8")
-    gone, used, exceptions = (part.split("\n", 1)[1] for part in text.split("\n# ")[1:])
+    words, exceptions = (part.split("\n", 1)[1] for part in text.split("\n# ")[1:])
     rows = [line.split(" | ") for line in exceptions.splitlines()]
     assert all(len(row) == 3 and row[2].strip() for row in rows), "word | files | why"
-    return set(gone.split()), set(used.split()), {word: files.split() for word, files, _ in rows}
+    return set(words.split()), {word: files.split() for word, files, _ in rows}
 
 
 def bare_names(nodes):
@@ -68,11 +68,11 @@ def bare_names(nodes):
 
     Without the files in which a word is the name by which users or the field know a thing.
     """
-    gone, used, exceptions = bare_words()
+    words, exceptions = bare_words()
     files_by_word = {}
     for path, of_file in nodes.items():
         file = path.relative_to(SOURCE).as_posix()
-        for word in {name.strip("_") for name in stored_names({path: of_file})} & (gone | used):
+        for word in {name.strip("_") for name in stored_names({path: of_file})} & words:
             if not {"*", file} & set(exceptions.get(word, ())):
                 files_by_word.setdefault(word, []).append(file)
     return files_by_word
@@ -95,14 +95,14 @@ def questions_for_kinds(nodes):
 def rules_outside_of_declarations(nodes):
     """Calls that check a value where a field or an argument could declare its rule.
 
-    A function of a value, `what` to call it and the `error` to raise belongs to a rule itself.
+    A function of a value, `label` to call it and the `error` to raise belongs to a rule itself.
     """
     checks = {"number", "whole_number", "one_of", "flag", "entries", "path_of"}
 
     def calls(node, is_rule):
         if isinstance(node, ast.FunctionDef):
             arguments = [*node.args.args, *node.args.kwonlyargs]
-            is_rule = {"what", "error"} <= {argument.arg for argument in arguments}
+            is_rule = {"label", "error"} <= {argument.arg for argument in arguments}
         name = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
         own = int(name in checks and not is_rule)
         return own + sum(calls(child, is_rule) for child in ast.iter_child_nodes(node))
@@ -154,7 +154,6 @@ def measured():
         "files": len(FILES),
         "lines without verification": sum(lines.values()),
         "lines of growth": growth,
-        "names by a bare word": len(bare_names(nodes)),
         "questions for kinds": questions_for_kinds(nodes),
         "rules outside of declarations": rules_outside_of_declarations(nodes),
         "tables of dimension": tables_of_dimension(nodes),
@@ -178,16 +177,14 @@ def check(numbers, part, request):
     assert not above, f"number and limit: {above}"
 
 
-def test_words_that_are_gone_stay_gone():
-    gone, used, _ = bare_words()
-    assert not gone & used
-    assert not {word: files for word, files in bare_names(product()).items() if word in gone}
+def test_no_name_is_a_bare_word():
+    assert not bare_names(product())
 
 
 def test_exceptions_of_words_are_in_use():
     """A file in which a word may be a name has that name: exceptions go when names go."""
-    gone, used, exceptions = bare_words()
-    assert set(exceptions) <= gone | used
+    words, exceptions = bare_words()
+    assert set(exceptions) <= words
     names = {p.relative_to(SOURCE).as_posix(): {name.strip("_") for name in stored_names({p: of})}
              for p, of in product().items()}  # fmt: skip
     for word, files in exceptions.items():
@@ -267,7 +264,7 @@ def ways():
             run = steps(problem)
             next(run)
             _, numbers[f"{dim} growth step"] = way(lambda r=run: next(r))
-    return {f"{name}: {what}": n for name, both in numbers.items() for what, n in both.items()}
+    return {f"{name}: {label}": n for name, both in numbers.items() for label, n in both.items()}
 
 
 @pytest.mark.slow

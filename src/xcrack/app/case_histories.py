@@ -191,9 +191,11 @@ class CollapseFactor(Declared):
         return float(np.interp(a, self.a, self.factor))
 
 
-def _check_points(x: Floats, y: Floats, what: str, name_of_y: str) -> None:
+def _check_points(x: Floats, y: Floats, label: str, name_of_y: str) -> None:
     if len(x) != len(y) or len(x) < 2 or not (np.diff(x) > 0).all():
-        raise ProblemError(f"{what}: give two rising numbers at least, and as many of {name_of_y}.")
+        raise ProblemError(
+            f"{label}: give two rising numbers at least, and as many of {name_of_y}."
+        )
 
 
 def _scatter(table: Table) -> Scatter:

@@ -50,7 +50,7 @@ class Table:
     def __contains__(self, name: str) -> bool:
         return name in self.content
 
-    def check_names(self, names: Iterable[str], what: str = "") -> None:
+    def check_names(self, names: Iterable[str], label: str = "") -> None:
         """Refuse keys that are not among these."""
         names = list(names)
         for name in self.content:
@@ -58,7 +58,7 @@ class Table:
                 similar_keys = difflib.get_close_matches(name, names, 1)
                 hint = f"did you mean {similar_keys[0]!r}? " if similar_keys else ""
                 self.refuse(
-                    name, f"there is no such key{what}: {hint}known are {', '.join(names)}."
+                    name, f"there is no such key{label}: {hint}known are {', '.join(names)}."
                 )
 
     def refuse(self, name: str, words: str) -> NoReturn:

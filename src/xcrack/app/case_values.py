@@ -191,7 +191,7 @@ def value_of_kind(table: Table, base: type, default: type) -> Any:
 def called_with(
     table: Table,
     maker: Callable[..., Any],
-    what: str = "",
+    label: str = "",
     other_names: Sequence[str] = (),
     arguments: Mapping[str, Any] | None = None,
 ) -> Any:
@@ -201,11 +201,11 @@ def called_with(
     if "units" in parameters and "units" not in table:  # those of the model
         all_arguments["units"] = _units_of_laws(table)
     table.check_names(
-        [*other_names, *(name for name in parameters if name not in (arguments or {}))], what
+        [*other_names, *(name for name in parameters if name not in (arguments or {}))], label
     )
     for name, parameter in parameters.items():
         if parameter.default is parameter.empty and name not in table and name not in all_arguments:
-            table.refuse("", f"the key {name!r}{what} is missing: give it.")
+            table.refuse("", f"the key {name!r}{label} is missing: give it.")
     for name in table.content:
         if name not in other_names:
             all_arguments[name] = argument_of(table, name, maker)

@@ -239,15 +239,15 @@ class _Writing:
                     table[name] = self._plain_value(value, name)
         return table
 
-    def states(self, states: Sequence[Any], what: str) -> list[Any]:
+    def states(self, states: Sequence[Any], label: str) -> list[Any]:
         """Load states: each a factor, or tables of loads."""
         makers, result = values.makers_of(Load), []
         for n, state in enumerate(states):
             if np.ndim(state) == 0 and not isinstance(state, Load):
-                result.append(self._plain_value(state, f"{what}[{n}]"))
+                result.append(self._plain_value(state, f"{label}[{n}]"))
                 continue
             result.append([
-                self._table(load, makers, f"{what}[{n}][{k}], {load.name}")
+                self._table(load, makers, f"{label}[{n}][{k}], {load.name}")
                 for k, load in enumerate([state] if isinstance(state, Load) else state)
             ])  # fmt: skip
         return result
@@ -284,18 +284,18 @@ class _Writing:
             table = {"kind": "arm", "crack": table, "on": on, "side": side}
         return table
 
-    def _by_set(self, value: Any, base: Any, what: str) -> dict[str, Any]:
+    def _by_set(self, value: Any, base: Any, label: str) -> dict[str, Any]:
         """A value, or one for each cell set."""
         makers = values.makers_of(base) if base else None
         if isinstance(value, _SETS):
             (pairs,) = (getattr(value, field.name) for field in fields(value))
             value = dict(pairs)
         if isinstance(value, Mapping):
-            return {name: self._table(value_of_set, makers, f"{what} of {name!r}")
+            return {name: self._table(value_of_set, makers, f"{label} of {name!r}")
                     for name, value_of_set in value.items()}  # fmt: skip
-        return self._table(value, makers, what)
+        return self._table(value, makers, label)
 
-    def _table(self, value: Any, makers: Any, what: str) -> dict[str, Any]:
+    def _table(self, value: Any, makers: Any, label: str) -> dict[str, Any]:
         """A value of a class that is declared: its kind, and what it was made of."""
         kind = type(value)
         if makers is None:
@@ -303,15 +303,15 @@ class _Writing:
         names = [name for name, maker in makers.items() if maker is kind or name == kind.__name__]
         if not names:
             is_function = callable(value) and not isinstance(value, GrowthLaw)
-            self._refuse(what, "function" if is_function else "class")
-        return {"kind": names[0], **self._fields(value, what)}
+            self._refuse(label, "function" if is_function else "class")
+        return {"kind": names[0], **self._fields(value, label)}
 
-    def _fields(self, value: Any, what: str) -> dict[str, Any]:
+    def _fields(self, value: Any, label: str) -> dict[str, Any]:
         """What a value was made of, less what it would be without."""
         if not is_dataclass(value):
-            self._refuse(what, "function")
+            self._refuse(label, "function")
         return {
-            name: self._plain_value(field_value, f"{what}: {name}")
+            name: self._plain_value(field_value, f"{label}: {name}")
             for name, field_value in self._values_off_default(value)
         }
 
@@ -325,7 +325,7 @@ class _Writing:
                 continue
             yield name, field_value
 
-    def _plain_value(self, value: Any, what: str) -> Any:
+    def _plain_value(self, value: Any, label: str) -> Any:
         if value is None:
             return FREE
         if isinstance(value, np.ndarray | np.generic):
@@ -335,18 +335,18 @@ class _Writing:
         if isinstance(value, tuple) and hasattr(value, "_asdict"):  # a curve of a rate_table
             value = value._asdict()
         if isinstance(value, list | tuple):
-            return [self._plain_value(entry, f"{what}[{k}]") for k, entry in enumerate(value)]
+            return [self._plain_value(entry, f"{label}[{k}]") for k, entry in enumerate(value)]
         if isinstance(value, Mapping):
             return {
-                name: self._plain_value(entry, f"{what}: {name}") for name, entry in value.items()
+                name: self._plain_value(entry, f"{label}: {name}") for name, entry in value.items()
             }
         if isinstance(value, Field):
             return self._field(value)
         if isinstance(value, Crack):
             return self._crack(value)
         if is_dataclass(value):
-            return self._table(value, None, what)
-        self._refuse(what, "function")
+            return self._table(value, None, label)
+        self._refuse(label, "function")
 
     def _field(self, field: Field) -> dict[str, Any]:
         """A field in a file beside the case: that of its name, if it is this one."""
@@ -364,15 +364,15 @@ class _Writing:
             "give a folder of its own for the case."
         )
 
-    def _name(self, value: Any, public_values: Mapping[str, Any], what: str) -> str:
+    def _name(self, value: Any, public_values: Mapping[str, Any], label: str) -> str:
         for name, public_value in public_values.items():
             if public_value is value:
                 return name
-        self._refuse(what, "function")
+        self._refuse(label, "function")
 
-    def _refuse(self, what: str, kind: str) -> NoReturn:
+    def _refuse(self, label: str, kind: str) -> NoReturn:
         noun = {"function": "a function", "class": "of a class of its own", "method": "a method"}
-        raise ProblemError(f"write_case: {what} is {noun[kind]}: {_MENDS[kind]}.")
+        raise ProblemError(f"write_case: {label} is {noun[kind]}: {_MENDS[kind]}.")
 
 
 def _lines(head: Mapping[str, Any], tables: Mapping[str, Any]) -> Iterator[str]:

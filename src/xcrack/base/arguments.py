@@ -73,7 +73,7 @@ class Rule:
     is_vector: ClassVar[bool] = False
     takes_names: ClassVar[bool] = False
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The value as it is kept; an error where it does not fit."""
         raise NotImplementedError
 
@@ -97,11 +97,11 @@ class Number(Rule):
     most: float | None = None
     hint: str = ""
 
-    def check(self, value: Any, what: str, error: Error) -> float:
+    def check(self, value: Any, label: str, error: Error) -> float:
         """The number as float."""
         bounds = {"above": self.above, "least": self.least, "below": self.below, "most": self.most}
         try:
-            return number(value, what, **bounds, error=error)
+            return number(value, label, **bounds, error=error)
         except error as refusal:
             if not self.hint:
                 raise
@@ -120,16 +120,16 @@ class Whole(Rule):
     least: int | None = None
     most: int | None = None
 
-    def check(self, value: Any, what: str, error: Error) -> int:
+    def check(self, value: Any, label: str, error: Error) -> int:
         """The number as int."""
         n_min, n_max = self.least, self.most
         try:
-            return whole_number(value, what, least=n_min, most=n_max, error=error)
+            return whole_number(value, label, least=n_min, most=n_max, error=error)
         except error:
             if n_min is None or n_max is None or n_max - n_min > _FEW:
                 raise
             choices = " or ".join(map(str, range(n_min, n_max + 1)))
-            raise error(f"{what} = {value_text(value)}: give {choices}.") from None
+            raise error(f"{label} = {value_text(value)}: give {choices}.") from None
 
     @property
     def words(self) -> str:
@@ -144,13 +144,13 @@ class Choice(Rule):
     values: tuple[Any, ...]
     needs: str = ""
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The value as it is."""
         if not self.needs and all(isinstance(choice, str) for choice in self.values):
-            return one_of(value, what, self.values, error=error)
+            return one_of(value, label, self.values, error=error)
         if not any(type(value) is type(choice) and value == choice for choice in self.values):
             choices = self.needs or " or ".join(repr(choice) for choice in self.values)
-            raise error(f"{what} = {value_text(value)}: give {choices}.")
+            raise error(f"{label} = {value_text(value)}: give {choices}.")
         return value
 
     @property
@@ -165,12 +165,12 @@ class SomeOf(Rule):
 
     values: tuple[str, ...]
 
-    def check(self, value: Any, what: str, error: Error) -> tuple[str, ...]:
+    def check(self, value: Any, label: str, error: Error) -> tuple[str, ...]:
         """The words as a tuple."""
-        words = (value,) if isinstance(value, str) else entries(value, what, error=error)
+        words = (value,) if isinstance(value, str) else entries(value, label, error=error)
         if not words or not all(isinstance(word, str) and word in self.values for word in words):
             choices = ", ".join(f'"{word}"' for word in self.values)
-            raise error(f"{what} = {value_text(value)}: give some of {choices}.")
+            raise error(f"{label} = {value_text(value)}: give some of {choices}.")
         return words
 
     @property
@@ -183,21 +183,21 @@ class SomeOf(Rule):
 class Flag(Rule):
     """True or False."""
 
-    def check(self, value: Any, what: str, error: Error) -> bool:
+    def check(self, value: Any, label: str, error: Error) -> bool:
         """The value as bool."""
-        return flag(value, what, error=error)
+        return flag(value, label, error=error)
 
 
 @dataclass(frozen=True, repr=False)
 class Progress(Rule):
     """Whether progress is shown: True or False, "always" where nobody watches too."""
 
-    def check(self, value: Any, what: str, error: Error) -> bool | str:
+    def check(self, value: Any, label: str, error: Error) -> bool | str:
         """The word, or a bool."""
         if isinstance(value, str) and value == "always":
             return value
         if not isinstance(value, bool | np.bool_):
-            raise error(f'{what} = {value_text(value)}: give True, False or "always".')
+            raise error(f'{label} = {value_text(value)}: give True, False or "always".')
         return bool(value)
 
 
@@ -208,10 +208,10 @@ class Text(Rule):
     needs: str = "a text"
     may_be_empty: bool = False
 
-    def check(self, value: Any, what: str, error: Error) -> str:
+    def check(self, value: Any, label: str, error: Error) -> str:
         """The text."""
         if not isinstance(value, str) or not (value or self.may_be_empty):
-            raise error(f"{what} = {value_text(value)}: give {self.needs}.")
+            raise error(f"{label} = {value_text(value)}: give {self.needs}.")
         return value
 
 
@@ -221,9 +221,9 @@ class FilePath(Rule):
 
     is_file: bool = False
 
-    def check(self, value: Any, what: str, error: Error) -> Path:
+    def check(self, value: Any, label: str, error: Error) -> Path:
         """The path."""
-        return path_of(value, what, error=error, is_file=self.is_file)
+        return path_of(value, label, error=error, is_file=self.is_file)
 
 
 @dataclass(frozen=True, repr=False)
@@ -238,9 +238,11 @@ class Array(Rule):
     is_whole: bool = False
     is_hashable: bool = False
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """A read-only copy."""
-        result = (whole_numbers if self.is_whole else numbers)(value, what, self.shape, error=error)
+        result = (whole_numbers if self.is_whole else numbers)(
+            value, label, self.shape, error=error
+        )
         return _tuples(result.tolist()) if self.is_hashable else frozen_copy(result)
 
 
@@ -251,9 +253,9 @@ class Points(Rule):
     shape: tuple[int | None, ...] | None = None
     unit: Unit = field(default=LENGTH, kw_only=True)
 
-    def check(self, value: Any, what: str, error: Error) -> Floats:
+    def check(self, value: Any, label: str, error: Error) -> Floats:
         """A read-only copy."""
-        return frozen_copy(point_coordinates(value, what, self.shape, error=error))
+        return frozen_copy(point_coordinates(value, label, self.shape, error=error))
 
     @property
     def words(self) -> str:
@@ -267,15 +269,15 @@ class Direction(Rule):
 
     needs: str = "a direction (x, y, z)"
 
-    def check(self, value: Any, what: str, error: Error) -> Floats:
+    def check(self, value: Any, label: str, error: Error) -> Floats:
         """The unit vector."""
         try:
-            vector = numbers(value, what, (3,), error=error)
+            vector = numbers(value, label, (3,), error=error)
         except error:
-            raise error(f"{what} = {value_text(value)}: give {self.needs}.") from None
+            raise error(f"{label} = {value_text(value)}: give {self.needs}.") from None
         length = float(np.linalg.norm(vector))
         if not 0 < length < np.inf:
-            raise error(f"{what} = {value_text(value)} has no direction: give {self.needs}.")
+            raise error(f"{label} = {value_text(value)} has no direction: give {self.needs}.")
         return np.asarray(vector / length)
 
 
@@ -285,11 +287,11 @@ class Interval(Rule):
 
     unit: Unit = field(default=NUMBER, kw_only=True)
 
-    def check(self, value: Any, what: str, error: Error) -> tuple[float, float]:
+    def check(self, value: Any, label: str, error: Error) -> tuple[float, float]:
         """Both as float."""
-        x_min, x_max = numbers(value, what, (2,), error=error).tolist()
+        x_min, x_max = numbers(value, label, (2,), error=error).tolist()
         if not x_min < x_max:
-            raise error(f"{what} = ({x_min:g}, {x_max:g}): give (lowest, highest).")
+            raise error(f"{label} = ({x_min:g}, {x_max:g}): give (lowest, highest).")
         return x_min, x_max
 
 
@@ -300,11 +302,11 @@ class Vector(Rule):
     unit: Unit = NUMBER
     is_vector = True
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """A read-only copy."""
-        vector = numbers(value, what, (None,), error=error)
+        vector = numbers(value, label, (None,), error=error)
         if len(vector) not in (2, 3):
-            raise error(f"{what} = {value_text(value)}: give 2 or 3 numbers.")
+            raise error(f"{label} = {value_text(value)}: give 2 or 3 numbers.")
         return frozen_copy(vector)
 
 
@@ -315,11 +317,11 @@ class Part(Rule):
     kind: Any
     needs: str = ""
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The value as it is."""
         if not isinstance(value, self.kind):
             raise error(
-                f"{what} = {value_text(value)}: give {self.needs or _class_words(self.kind)}."
+                f"{label} = {value_text(value)}: give {self.needs or _class_words(self.kind)}."
             )
         return value
 
@@ -331,13 +333,13 @@ class Parts(Rule):
     kind: Any
     needs: str = ""
 
-    def check(self, value: Any, what: str, error: Error) -> tuple[Any, ...]:
+    def check(self, value: Any, label: str, error: Error) -> tuple[Any, ...]:
         """The values as a tuple."""
-        items = entries(value, what, error=error)
+        items = entries(value, label, error=error)
         for item in items:
             if not isinstance(item, self.kind):
                 raise error(
-                    f"{what}: {value_text(item)} is not one of them: give "
+                    f"{label}: {value_text(item)} is not one of them: give "
                     f"{self.needs or _class_words(self.kind)}."
                 )
         return items
@@ -351,13 +353,13 @@ class OneOrMore(Rule):
     needs: str = ""
     may_be_empty: bool = False
 
-    def check(self, value: Any, what: str, error: Error) -> tuple[Any, ...]:
+    def check(self, value: Any, label: str, error: Error) -> tuple[Any, ...]:
         """The values as a tuple."""
-        items = (value,) if isinstance(value, self.kind) else entries(value, what, error=error)
+        items = (value,) if isinstance(value, self.kind) else entries(value, label, error=error)
         fits = all(isinstance(item, self.kind) for item in items)
         if not fits or not (items or self.may_be_empty):
             needs = self.needs or f"a {self.kind.__name__}"
-            raise error(f"{what} = {value_text(value)}: give {needs}, or a list of them.")
+            raise error(f"{label} = {value_text(value)}: give {needs}, or a list of them.")
         return items
 
 
@@ -367,22 +369,22 @@ class Items(Rule):
 
     keeps_sets: bool = False
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The entries as a tuple."""
-        items = entries(value, what, error=error)
+        items = entries(value, label, error=error)
         return value if self.keeps_sets and isinstance(value, AbstractSet) else items
 
 
 @dataclass(frozen=True, repr=False)
 class CheckedBy(Rule):
-    """What a function (value, what, error) takes; kept as that returns it."""
+    """What a function (value, label, error) takes; kept as that returns it."""
 
     function: Callable[[Any, str, Error], Any]
     unit: Unit = field(default=None, kw_only=True)
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """What the function makes of the value."""
-        return self.function(value, what, error)
+        return self.function(value, label, error)
 
     @property
     def words(self) -> str:
@@ -396,10 +398,10 @@ class Function(Rule):
 
     needs: str = "a function"
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The function."""
         if not callable(value):
-            raise error(f"{what} = {value_text(value)} cannot be called: give {self.needs}.")
+            raise error(f"{label} = {value_text(value)} cannot be called: give {self.needs}.")
         return value
 
 
@@ -413,12 +415,12 @@ class Either(Rule):
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", self.second_rule.unit)
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The value as the rule that it fits keeps it."""
         try:
-            return self.first_rule.check(value, what, error)
+            return self.first_rule.check(value, label, error)
         except error:
-            return self.second_rule.check(value, what, error)
+            return self.second_rule.check(value, label, error)
 
     @property
     def words(self) -> str:
@@ -453,11 +455,11 @@ class Argument:
         unit = None if self.rule is None else self.rule.unit
         return unit(owner) if callable(unit) else unit
 
-    def check(self, value: Any, what: str, error: Error = ProblemError) -> Any:
+    def check(self, value: Any, label: str, error: Error = ProblemError) -> Any:
         """The value as it is kept."""
         if self.rule is None or (value is None and self.is_optional):
             return value
-        return self.rule.check(value, what, error)
+        return self.rule.check(value, label, error)
 
 
 def arguments_of(owner: Any) -> dict[str, Argument]:
@@ -582,9 +584,9 @@ def check_arguments(error: Error = ProblemError) -> Callable[[Callable[P, T]], C
             ):
                 return function(*values, **keyword_values)  # raises in Python's own words
             arguments |= keyword_values
-            for name, (argument, what) in rules().items():
+            for name, (argument, label) in rules().items():
                 if name in arguments:
-                    arguments[name] = argument.check(arguments[name], what, error)
+                    arguments[name] = argument.check(arguments[name], label, error)
             return cast(Callable[..., T], function)(**arguments)
 
         run.__doc__ = _with_bounds(function.__doc__, function.__annotations__)

@@ -21,7 +21,7 @@ LARGEST = 1e90  # coordinate whose third power is still a number
 
 def number(
     value: Any,
-    what: str,
+    label: str,
     *,
     above: float | None = None,
     least: float | None = None,
@@ -34,7 +34,7 @@ def number(
     Parameters
     ----------
     value : anything
-    what : str
+    label : str
         Its name in the message, such as ``"paris: C"``.
     above, least, below, most : float, optional
         Bounds: exclusive from below, inclusive, exclusive from above, inclusive.
@@ -58,7 +58,7 @@ def number(
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         expectation = "a finite number" + _bounds(above, least, below, most)
-        raise error(f"{what} = {value_text(value)} is not a number: give {expectation}.")
+        raise error(f"{label} = {value_text(value)} is not a number: give {expectation}.")
     try:
         result = float(value)
     except OverflowError:
@@ -71,13 +71,13 @@ def number(
         and (most is None or result <= most)
     ):
         expectation = "a finite number" + _bounds(above, least, below, most)
-        raise error(f"{what} = {value_text(value)} is not possible: give {expectation}.")
+        raise error(f"{label} = {value_text(value)} is not possible: give {expectation}.")
     return result
 
 
 def whole_number(
     value: Any,
-    what: str,
+    label: str,
     *,
     least: int | None = None,
     most: int | None = None,
@@ -87,7 +87,7 @@ def whole_number(
 
     Parameters
     ----------
-    value, what, error
+    value, label, error
         As of `number`.
     least, most : int, optional
         Inclusive bounds.
@@ -113,26 +113,28 @@ def whole_number(
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise error(f"{what} = {value_text(value)} is not a number: give {expectation}.")
+        raise error(f"{label} = {value_text(value)} is not a number: give {expectation}.")
     try:
         result = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         as_float = float(value)
         if not as_float.is_integer():  # nan and inf are not either
             raise error(
-                f"{what} = {value_text(value)} is not possible: give {expectation}."
+                f"{label} = {value_text(value)} is not possible: give {expectation}."
             ) from None
         result = int(as_float)
     if (least is not None and result < least) or (most is not None and result > most):
-        raise error(f"{what} = {value_text(value)} is not possible: give {expectation}.")
+        raise error(f"{label} = {value_text(value)} is not possible: give {expectation}.")
     if abs(result) >= 2**63:
-        raise error(f"{what} = {value_text(value)} is too large to count with: give {expectation}.")
+        raise error(
+            f"{label} = {value_text(value)} is too large to count with: give {expectation}."
+        )
     return result
 
 
 def numbers(
     value: Any,
-    what: str,
+    label: str,
     shape: Shape | None = None,
     *,
     must_be_finite: bool = True,
@@ -143,7 +145,7 @@ def numbers(
     Parameters
     ----------
     value : anything
-    what : str
+    label : str
         Its name in the message.
     shape : tuple of int or None, optional
         Wanted shape, None where any length will do; any shape if omitted.
@@ -174,18 +176,18 @@ def numbers(
         or not has_shape(value.shape, shape)
     ):
         expectation = "an array of real numbers" + _of_shape(shape)
-        value = _real_array(value, what, expectation, error).astype(np.float64, copy=False)
-        _check_shape(value, what, shape, expectation, error)
+        value = _real_array(value, label, expectation, error).astype(np.float64, copy=False)
+        _check_shape(value, label, shape, expectation, error)
     result: Floats = value
     if must_be_finite and not np.isfinite(result).all():
         index = np.unravel_index(int(np.argmin(np.isfinite(result))), result.shape)
         place = "" if result.ndim == 0 else f"[{', '.join(str(int(i)) for i in index)}]"
-        raise error(f"{what}{place} = {result[index]}: every number must be finite.")
+        raise error(f"{label}{place} = {result[index]}: every number must be finite.")
     return result
 
 
 def point_coordinates(
-    value: Any, what: str, shape: Shape | None = None, *, error: type[XcrackError] = MeshError
+    value: Any, label: str, shape: Shape | None = None, *, error: type[XcrackError] = MeshError
 ) -> Floats:
     """Check that a value is an array of finite coordinates, small enough to compute with.
 
@@ -198,10 +200,10 @@ def point_coordinates(
     -------
     array of float
     """
-    x = numbers(value, what, shape, error=error)
+    x = numbers(value, label, shape, error=error)
     if x.size and np.abs(x).max() > LARGEST:
         raise error(
-            f"{what}: coordinates of up to {np.abs(x).max():.3g} are too large to compute with "
+            f"{label}: coordinates of up to {np.abs(x).max():.3g} are too large to compute with "
             "their powers; take another unit of length."
         )
     return x
@@ -209,7 +211,7 @@ def point_coordinates(
 
 def whole_numbers(
     value: Any,
-    what: str,
+    label: str,
     shape: Shape | None = None,
     *,
     error: type[XcrackError] = ProblemError,
@@ -238,26 +240,26 @@ def whole_numbers(
     if type(value) is np.ndarray and value.dtype == np.int64 and has_shape(value.shape, shape):
         return value
     expectation = "an array of whole numbers" + _of_shape(shape)
-    result = _real_array(value, what, expectation, error)
-    _check_shape(result, what, shape, expectation, error)
+    result = _real_array(value, label, expectation, error)
+    _check_shape(result, label, shape, expectation, error)
     if result.dtype.kind == "f":
         result = result.astype(np.float64, copy=False)  # a half float ends at 65504
         is_no_integer = ~(
             np.isfinite(result) & (result == np.round(result)) & (np.abs(result) < 2**53)
         )
         if is_no_integer.any():
-            raise error(f"{what} holds {result[is_no_integer].flat[0]}: give {expectation}.")
+            raise error(f"{label} holds {result[is_no_integer].flat[0]}: give {expectation}.")
     return result.astype(np.int64, copy=False)
 
 
 def one_of(
-    value: Any, what: str, words: Sequence[str], *, error: type[XcrackError] = ProblemError
+    value: Any, label: str, words: Sequence[str], *, error: type[XcrackError] = ProblemError
 ) -> str:
     """Check that a value is one of some words, and return it.
 
     Parameters
     ----------
-    value, what, error
+    value, label, error
         As of `number`.
     words : sequence of str
 
@@ -277,16 +279,16 @@ def one_of(
     """
     if not isinstance(value, str) or value not in words:
         choices = " or ".join([", ".join(f'"{word}"' for word in words[:-1]), f'"{words[-1]}"'])
-        raise error(f"{what} = {value_text(value)} is not known: give {choices}.")
+        raise error(f"{label} = {value_text(value)} is not known: give {choices}.")
     return value
 
 
-def flag(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> bool:
+def flag(value: Any, label: str, *, error: type[XcrackError] = ProblemError) -> bool:
     """Check that a value is True or False, and return it; 1 and "no" are neither.
 
     Parameters
     ----------
-    value, what, error
+    value, label, error
         As of `number`.
 
     Returns
@@ -304,16 +306,16 @@ def flag(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> b
     False
     """
     if not isinstance(value, bool | np.bool_):
-        raise error(f"{what} = {value_text(value)}: give True or False.")
+        raise error(f"{label} = {value_text(value)}: give True or False.")
     return bool(value)
 
 
-def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -> tuple[Any, ...]:
+def entries(value: Any, label: str, *, error: type[XcrackError] = ProblemError) -> tuple[Any, ...]:
     """Entries of a list, tuple or whatever else can be gone through, but for text and mappings.
 
     Parameters
     ----------
-    value, what, error
+    value, label, error
         As of `number`.
 
     Returns
@@ -330,7 +332,7 @@ def entries(value: Any, what: str, *, error: type[XcrackError] = ProblemError) -
     except Exception:  # whatever an object's own __iter__ raises
         items = None
     if items is None:
-        raise error(f"{what} = {value_text(value)}: give a list.")
+        raise error(f"{label} = {value_text(value)}: give a list.")
     return tuple(items)
 
 
@@ -393,13 +395,13 @@ def value_text(value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:60]} … ({type(value).__name__})"
 
 
-def call_function(function: Callable[..., Any], what: str, *arguments: Any) -> Any:
+def call_function(function: Callable[..., Any], label: str, *arguments: Any) -> Any:
     """Call a user's function; an exception in it keeps its type and says where it was called.
 
     Parameters
     ----------
     function : callable
-    what : str
+    label : str
         What xcrack needed it for, such as ``"the value of traction('top')"``.
     *arguments
         Passed on.
@@ -408,36 +410,36 @@ def call_function(function: Callable[..., Any], what: str, *arguments: Any) -> A
         return function(*arguments)
     except Exception as error:
         name = getattr(function, "__qualname__", None) or repr(function)
-        error.add_note(f"raised in {name}, which xcrack called for {what}.")
+        error.add_note(f"raised in {name}, which xcrack called for {label}.")
         raise
 
 
-def _real_array(value: Any, what: str, expectation: str, error: type[XcrackError]) -> Any:
+def _real_array(value: Any, label: str, expectation: str, error: type[XcrackError]) -> Any:
     if isinstance(value, np.ma.MaskedArray):
         if np.ma.getmaskarray(value).any():
-            raise error(f"{what} has masked entries: give {expectation}, without a mask.")
+            raise error(f"{label} has masked entries: give {expectation}, without a mask.")
         value = value.data
     if isinstance(value, bytes | bytearray):  # numpy takes the second for numbers
-        raise error(f"{what} = {value_text(value)} is text: give {expectation}.")
+        raise error(f"{label} = {value_text(value)} is text: give {expectation}.")
     try:
         result = np.asarray(value)
     except Exception as cause:  # ragged rows, or whatever an object's own __array__ raises
-        raise error(f"{what} = {value_text(value)}: give {expectation} ({cause}).") from cause
+        raise error(f"{label} = {value_text(value)}: give {expectation} ({cause}).") from cause
     if result.size == 0 and result.dtype.kind in "Of":
         return result.astype(float)
     if result.dtype.kind not in "iuf":
         kind = {"c": "complex", "b": "bool", "U": "str", "S": "bytes"}.get(
             result.dtype.kind, str(result.dtype)
         )
-        raise error(f"{what} = {value_text(value)} holds {kind} entries: give {expectation}.")
+        raise error(f"{label} = {value_text(value)} holds {kind} entries: give {expectation}.")
     return result
 
 
 def _check_shape(
-    result: Any, what: str, shape: Shape | None, expectation: str, error: type[XcrackError]
+    result: Any, label: str, shape: Shape | None, expectation: str, error: type[XcrackError]
 ) -> None:
     if not has_shape(result.shape, shape):
-        raise error(f"{what} has the shape {result.shape}: give {expectation}.")
+        raise error(f"{label} has the shape {result.shape}: give {expectation}.")
 
 
 @cache
@@ -460,14 +462,14 @@ def _bounds(
 
 
 def values_by_set(
-    entry: Any, what: str, values: str, maker: str, value: str, is_value: Callable[[Any], bool]
+    entry: Any, label: str, values: str, maker: str, value: str, is_value: Callable[[Any], bool]
 ) -> tuple[tuple[str, Any], ...]:
     """Check a mapping from names of cell sets to values, and return its pairs.
 
     Parameters
     ----------
     entry : mapping, or tuple of pairs
-    what : str
+    label : str
         What the values are of, in messages.
     values, value : str
         What they are, and how one is given.
@@ -483,20 +485,20 @@ def values_by_set(
     pairs = entry.items() if isinstance(entry, Mapping) else entry
     if not isinstance(entry, Mapping | tuple) or not pairs:
         raise ProblemError(
-            f"{what}: {value_text(entry)}: give a mapping of cell sets to {values}, such as "
+            f"{label}: {value_text(entry)}: give a mapping of cell sets to {values}, such as "
             f'{{"plate": {maker}(...), "weld": {maker}(...)}}.'
         )
     for name, v in pairs:
         if not isinstance(name, str) or not is_value(v):
             raise ProblemError(
-                f"{what}: {value_text(name)}: {value_text(v)}: give the name of a cell set, and "
+                f"{label}: {value_text(name)}: {value_text(v)}: give the name of a cell set, and "
                 f"{value}."
             )
     return tuple(pairs)
 
 
 def check_set_names(
-    set_names: Sequence[str], names: Sequence[str], what: str, values: str, value: str
+    set_names: Sequence[str], names: Sequence[str], label: str, values: str, value: str
 ) -> None:
     """Raise where values are for other cell sets than the materials of a problem have.
 
@@ -515,7 +517,7 @@ def check_set_names(
     if sorted(set_names) != sorted(names):
         listing = ", ".join(map(repr, names)) if names[0] else "one, without a name"
         raise ProblemError(
-            f"{what}: there are {values} for {', '.join(map(repr, set_names))}, and the materials "
+            f"{label}: there are {values} for {', '.join(map(repr, set_names))}, and the materials "
             f"of the problem are {listing}: give each of them {value}."
         )
 

@@ -28,14 +28,14 @@ _MEND = {
 
 
 def path_of(
-    value: Any, what: str, *, error: type[XcrackError] = XcrackError, is_file: bool = False
+    value: Any, label: str, *, error: type[XcrackError] = XcrackError, is_file: bool = False
 ) -> Path:
     """Check that a value can be the path of a file, and return it.
 
     Parameters
     ----------
     value : anything
-    what : str
+    label : str
         Its name in the message, such as ``"write_mesh: path"``.
     error : type of XcrackError
     is_file : bool
@@ -60,25 +60,27 @@ def path_of(
     except Exception:  # whatever an object's own __fspath__ raises
         text = None
     if not isinstance(text, str):
-        raise error(f"{what} = {value_text(value)} is not a path: give a string or a pathlib.Path.")
+        raise error(
+            f"{label} = {value_text(value)} is not a path: give a string or a pathlib.Path."
+        )
     if not text or "\0" in text:
         reason = "holds a NUL character" if text else "is empty"
-        raise error(f"{what} = {value_text(value)} {reason}: give the path of a file.")
+        raise error(f"{label} = {value_text(value)} {reason}: give the path of a file.")
     path = Path(text)
     if is_file and path.name in ("", ".."):
-        raise error(f"{what} = {value_text(str(path))} is a folder: give a file in it.")
+        raise error(f"{label} = {value_text(str(path))} is a folder: give a file in it.")
     return path
 
 
 @contextmanager
 def system_errors(
-    what: str, path: Path, *, error: type[XcrackError] = XcrackError
+    label: str, path: Path, *, error: type[XcrackError] = XcrackError
 ) -> Iterator[None]:
     """Turn what the system refuses (no space, no permission, a folder) into an error of ours.
 
     Parameters
     ----------
-    what : str
+    label : str
         What failed, such as ``"the mesh cannot be written to"``; the path follows.
     path : Path
     error : type of XcrackError
@@ -89,14 +91,14 @@ def system_errors(
         For an OSError; it names the path, what the system said, and what to do.
     """
     try:
-        kind = _endless_kind(path) if "read" in what else ""
+        kind = _endless_kind(path) if "read" in label else ""
         if kind:
-            raise error(f"{what} {_shown_path(path)}: it is a {kind}: give the path of a file.")
+            raise error(f"{label} {_shown_path(path)}: it is a {kind}: give the path of a file.")
         yield
     except OSError as cause:
         reason = cause.strerror or str(cause) or type(cause).__name__
         mend = _MEND.get(cause.errno or 0, "check the path")
-        raise error(f"{what} {_shown_path(path)}: {reason}: {mend}.") from cause
+        raise error(f"{label} {_shown_path(path)}: {reason}: {mend}.") from cause
 
 
 def _endless_kind(path: Path) -> str:
@@ -115,7 +117,7 @@ def _shown_path(path: Path) -> str:
 
 @contextmanager
 def written_whole(
-    path: Path, what: str, *, error: type[XcrackError] = XcrackError
+    path: Path, label: str, *, error: type[XcrackError] = XcrackError
 ) -> Iterator[Path]:
     """Write a file wholly or not at all: an older one stays as it was where that fails.
 
@@ -125,7 +127,7 @@ def written_whole(
     Parameters
     ----------
     path : Path
-    what : str
+    label : str
         As of `system_errors`.
     error : type of XcrackError
 
@@ -134,7 +136,7 @@ def written_whole(
     error
         For an OSError; nothing is left of the attempt.
     """
-    with system_errors(what, path, error=error):
+    with system_errors(label, path, error=error):
         target = path.resolve()
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -151,7 +153,7 @@ def written_whole(
 
 
 def write_texts(
-    texts: Mapping[Path, str], what: str, *, error: type[XcrackError] = XcrackError
+    texts: Mapping[Path, str], label: str, *, error: type[XcrackError] = XcrackError
 ) -> None:
     """Write files of text in UTF-8; none takes the place of an older one before all are whole.
 
@@ -159,7 +161,7 @@ def write_texts(
     ----------
     texts : mapping of Path to str
         Their folders are made if they are not there.
-    what : str
+    label : str
         As of `system_errors`.
     error : type of XcrackError
 
@@ -170,9 +172,9 @@ def write_texts(
     """
     with ExitStack() as parts:
         for path, text in texts.items():
-            with system_errors(what, path, error=error):
+            with system_errors(label, path, error=error):
                 path.parent.mkdir(parents=True, exist_ok=True)
-            part = parts.enter_context(written_whole(path, what, error=error))
+            part = parts.enter_context(written_whole(path, label, error=error))
             part.write_text(text, encoding="utf-8", newline="")
 
 

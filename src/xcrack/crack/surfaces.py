@@ -255,8 +255,8 @@ def surface_crack(
     >>> surface_crack([(0, 0, 0), (1, 0, 0), (1, 1, 0.1), (0, 1, 0)], [(0, 1, 2), (0, 3, 2)])
     Crack(4 points, 2 faces, not placed)
     """
-    what = "surface_crack: points"
-    x = numbers(points, what, (None, 3), must_be_finite=False, error=GeometryError)
+    label = "surface_crack: points"
+    x = numbers(points, label, (None, 3), must_be_finite=False, error=GeometryError)
     faces = whole_numbers(triangles, "surface_crack: triangles", error=GeometryError)
     if not faces.size:
         raise GeometryError("a surface crack needs triangles (f, 3), and there are none.")
@@ -272,7 +272,7 @@ def surface_crack(
     if not np.isfinite(x).all():
         face = int(used_points[np.argmax(~np.isfinite(x).all(axis=1))])
         raise GeometryError(f"point {face} of the surface crack is not finite: give it.")
-    x = point_coordinates(x, what, (None, 3), error=GeometryError)
+    x = point_coordinates(x, label, (None, 3), error=GeometryError)
     _check_shape(x, faces)
     new_faces = oriented_faces(faces)
     if new_faces is None:
@@ -369,8 +369,8 @@ def _merged_points(points: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     return x[first], faces[is_proper]
 
 
-def _unit(vector: Floats, what: str) -> Floats:
+def _unit(vector: Floats, label: str) -> Floats:
     length = float(np.linalg.norm(vector))
     if length == 0:
-        raise GeometryError(f"{what} is zero: give the direction from lip - to lip +.")
+        raise GeometryError(f"{label} is zero: give the direction from lip - to lip +.")
     return np.asarray(vector / length)

@@ -24,26 +24,26 @@ _CLOSED = 1e-3  # share of the largest K below which a negative K_I is that of a
 _DIFFER = 0.2  # share by which the two kinds of range may differ before a warning
 
 
-def columns_of_K(value: Any, what: str = "K", error: type[XcrackError] = ProblemError) -> Floats:
+def columns_of_K(value: Any, label: str = "K", error: type[XcrackError] = ProblemError) -> Floats:
     """K as `(..., 2 or 3)` array of finite numbers."""
-    K = numbers(value, what, error=error)
+    K = numbers(value, label, error=error)
     if K.ndim < 1 or K.shape[-1] not in (2, 3):
-        raise error(f"{what} must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
+        raise error(f"{label} must have 2 or 3 columns (I, II[, III]), not shape {K.shape}.")
     return K
 
 
-def states_of_K(value: Any, what: str, error: type[XcrackError]) -> Floats:
+def states_of_K(value: Any, label: str, error: type[XcrackError]) -> Floats:
     """K of load states as `(s, f, 2 or 3)` array of finite numbers."""
-    K = numbers(value, what, must_be_finite=False, error=error)
+    K = numbers(value, label, must_be_finite=False, error=error)
     if K.ndim != 3 or K.shape[-1] not in (2, 3) or len(K) == 0:
         raise error(
-            f"{what}: a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
+            f"{label}: a criterion takes K of shape (states, front points, 2 or 3), not {K.shape}; "
             "a single state is K[None]."
         )
     if not np.isfinite(K).all():
         state, point, mode = np.argwhere(~np.isfinite(K))[0]
         raise error(
-            f"{what} of state {state}, front point {point}, mode {mode + 1} is "
+            f"{label} of state {state}, front point {point}, mode {mode + 1} is "
             f"{K[state, point, mode]}: no direction can be chosen."
         )
     return K

@@ -16,21 +16,21 @@ from xcrack.base.errors import ProblemError, XcrackError
 from xcrack.model.loads import Load
 
 
-def _load_states(value: Any, what: str, error: type[XcrackError]) -> tuple[Any, ...]:
+def _load_states(value: Any, label: str, error: type[XcrackError]) -> tuple[Any, ...]:
     """Load states, checked: each a number, or loads."""
-    states = entries(value, what, error=error)
+    states = entries(value, label, error=error)
     if not states:
         raise error("Cycle(states=...) takes a list of at least one load state.")
-    return tuple(_load_state(state, f"{what}[{k}]", error) for k, state in enumerate(states))
+    return tuple(_load_state(state, f"{label}[{k}]", error) for k, state in enumerate(states))
 
 
-def _load_state(state: Any, what: str, error: type[XcrackError]) -> Any:
+def _load_state(state: Any, label: str, error: type[XcrackError]) -> Any:
     if isinstance(state, Real):
-        return number(state, what, error=error)
-    loads = entries(state, what, error=error)
+        return number(state, label, error=error)
+    loads = entries(state, label, error=error)
     for load in loads:
         if not isinstance(load, Load):
-            raise error(f"{what} has {value_text(load)}, which is not a load: see traction.")
+            raise error(f"{label} has {value_text(load)}, which is not a load: see traction.")
     return state if isinstance(state, list | tuple) else loads
 
 

@@ -110,13 +110,14 @@ class Threshold(Constants):
 class ApproachRule(Rule):
     """How growth begins above a threshold: in words, or an exponent."""
 
-    def check(self, value: Any, what: str, error: type[XcrackError]) -> str | float:
+    def check(self, value: Any, label: str, error: type[XcrackError]) -> str | float:
         """The word, or the exponent as float."""
         if not isinstance(value, str):
-            return number(value, what, above=0, error=error)
+            return number(value, label, above=0, error=error)
         if value not in ("cut", "difference", "shift"):
             raise error(
-                f'{what} = {value_text(value)}: give "cut", "difference", "shift" or an exponent p.'
+                f'{label} = {value_text(value)}: give "cut", "difference", "shift" or an '
+                "exponent p."
             )
         return value
 
@@ -124,11 +125,11 @@ class ApproachRule(Rule):
 class BoundsRule(Rule):
     """Lowest and highest R, in order; kept as a tuple."""
 
-    def check(self, value: Any, what: str, error: type[XcrackError]) -> Bounds:
+    def check(self, value: Any, label: str, error: type[XcrackError]) -> Bounds:
         """Both as float."""
-        lower_bound, upper_bound = numbers(value, what, (2,), error=error).tolist()
+        lower_bound, upper_bound = numbers(value, label, (2,), error=error).tolist()
         if not lower_bound < upper_bound:
-            raise error(f"{what} = ({lower_bound:g}, {upper_bound:g}): give (lowest, highest).")
+            raise error(f"{label} = ({lower_bound:g}, {upper_bound:g}): give (lowest, highest).")
         return lower_bound, upper_bound
 
 

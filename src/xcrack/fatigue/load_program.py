@@ -158,7 +158,7 @@ class K_gradient(LoadProgram):
         return _values_over_K(self.K * np.exp(self.gradient * (a - self.a0)), K_max)
 
 
-def _positive_values(curve: Any, x: Floats, what: str, of: str) -> Floats:
+def _positive_values(curve: Any, x: Floats, label: str, of: str) -> Floats:
     """Values of a curve, one for each place.
 
     Raises
@@ -168,18 +168,18 @@ def _positive_values(curve: Any, x: Floats, what: str, of: str) -> Floats:
     """
     x = np.asarray(x, dtype=float)
     if callable(curve):
-        values = numbers(call_function(curve, what, x), f"{what}({of})")
+        values = numbers(call_function(curve, label, x), f"{label}({of})")
     else:
         values = np.asarray(np.interp(x, curve[:, 0], curve[:, 1]))
     if values.shape not in ((), x.shape):
         raise ProblemError(
-            f"{what}({of}) has the shape {values.shape} for {x.size} places: give one value for "
+            f"{label}({of}) has the shape {values.shape} for {x.size} places: give one value for "
             "each."
         )
     values = np.broadcast_to(values, x.shape)
     if not (values > 0).all():
         at = x.ravel()[int(np.argmin(values > 0))]
-        raise ProblemError(f"{what}({of}) is not positive at {of} = {at:g}.")
+        raise ProblemError(f"{label}({of}) is not positive at {of} = {at:g}.")
     return np.asarray(values)
 
 

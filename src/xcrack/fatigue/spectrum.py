@@ -126,22 +126,22 @@ def rainflow(values: Annotated[ArrayLike, Array((None,))]) -> NDArray[Any]:
 BlockName = Annotated[str, Text("a word, such as 'flight'")]
 
 
-def checked_loads(value: Any, what: str, error: type[XcrackError]) -> tuple[Load, ...]:
+def checked_loads(value: Any, label: str, error: type[XcrackError]) -> tuple[Load, ...]:
     """Loads as a tuple, checked."""
-    loads = entries(value, what, error=error)
+    loads = entries(value, label, error=error)
     for load in loads:
         if not isinstance(load, Load):
-            raise error(f"{what} has {value_text(load)}, which is not a load: see traction.")
+            raise error(f"{label} has {value_text(load)}, which is not a load: see traction.")
     return loads
 
 
-def named_states(value: Any, what: str, error: type[XcrackError]) -> tuple[Any, ...]:
+def named_states(value: Any, label: str, error: type[XcrackError]) -> tuple[Any, ...]:
     """Load states, checked: a factor or loads each."""
     return tuple(
-        number(state, f"{what}[{k}]", error=error)
+        number(state, f"{label}[{k}]", error=error)
         if isinstance(state, Real)
-        else checked_loads(state, f"{what}[{k}]", error)
-        for k, state in enumerate(entries(value, what, error=error))
+        else checked_loads(state, f"{label}[{k}]", error)
+        for k, state in enumerate(entries(value, label, error=error))
     )
 
 

@@ -24,7 +24,7 @@ class Curve(NamedTuple):
     rate: tuple[float, ...]
 
 
-def checked_curves(value: Any, what: str, error: type[XcrackError]) -> tuple[Curve, ...]:
+def checked_curves(value: Any, label: str, error: type[XcrackError]) -> tuple[Curve, ...]:
     """Curves by rising R, checked: a mapping, or those of another table."""
     curves: list[tuple[Any, Any]] = []
     if isinstance(value, Mapping):
@@ -34,23 +34,23 @@ def checked_curves(value: Any, what: str, error: type[XcrackError]) -> tuple[Cur
         if len(parts) == len(value):
             curves = [(R, (dK, rate)) for R, dK, rate in parts]
     if not curves:
-        raise error(f"{what}: give a dict of R to (dK, rate).")
-    return tuple(sorted(_curve(R, points, what, error) for R, points in curves))
+        raise error(f"{label}: give a dict of R to (dK, rate).")
+    return tuple(sorted(_curve(R, points, label, error) for R, points in curves))
 
 
-def _curve(R: Any, points: Any, what: str, error: type[XcrackError]) -> Curve:
+def _curve(R: Any, points: Any, label: str, error: type[XcrackError]) -> Curve:
     """One curve, checked."""
-    ratio = number(R, f"{what}: R", below=1, error=error)
+    ratio = number(R, f"{label}: R", below=1, error=error)
     try:
         dK, rate = points
     except (TypeError, ValueError):
-        raise error(f"{what}: curve of R = {ratio:g}: give (dK, rate).") from None
-    dK = numbers(dK, f"{what}: dK of R = {ratio:g}", (None,), error=error)
-    rate = numbers(rate, f"{what}: rate of R = {ratio:g}", (len(dK),), error=error)
+        raise error(f"{label}: curve of R = {ratio:g}: give (dK, rate).") from None
+    dK = numbers(dK, f"{label}: dK of R = {ratio:g}", (None,), error=error)
+    rate = numbers(rate, f"{label}: rate of R = {ratio:g}", (len(dK),), error=error)
     is_rising = all(len(x) > 1 and x[0] > 0 and (np.diff(x) > 0).all() for x in (dK, rate))
     if not is_rising:
         raise error(
-            f"{what}: curve of R = {ratio:g}: give two or more points, ranges and rates "
+            f"{label}: curve of R = {ratio:g}: give two or more points, ranges and rates "
             "positive and rising."
         )
     return Curve(ratio, tuple(dK.tolist()), tuple(rate.tolist()))

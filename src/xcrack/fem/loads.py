@@ -351,14 +351,14 @@ def _impose(
     is_fitted[functions[~is_fixed_again], axis] = from_fit[~is_fixed_again]
 
 
-def _set_nodes(space: FunctionSpace, where: object, what: str) -> Ints:
+def _set_nodes(space: FunctionSpace, where: object, label: str) -> Ints:
     if isinstance(where, str):
-        facets = facet_set(space.mesh, where, what)
+        facets = facet_set(space.mesh, where, label)
         return np.unique(facet_nodes(space.mesh, space.order, facets))
     x = np.asarray(where)
     if x.ndim == 1:
-        return np.array([nearest_point(space.mesh, x, what)])
-    number = nearest_nodes(space.mesh, x, what)
+        return np.array([nearest_point(space.mesh, x, label)])
+    number = nearest_nodes(space.mesh, x, label)
     if space.order == 1:  # the ends of an edge hold its middle
         is_middle = number >= space.mesh.n_points
         ends = space.mesh.edges[number[is_middle] - space.mesh.n_points]
@@ -366,16 +366,16 @@ def _set_nodes(space: FunctionSpace, where: object, what: str) -> Ints:
     return np.unique(number)
 
 
-def _functions_of(space: FunctionSpace, where: object, what: str) -> Ints:
+def _functions_of(space: FunctionSpace, where: object, label: str) -> Ints:
     """Functions that act on a set: standard ones, and enriched ones with a trace there.
 
     At a point only the standard function has a value, and that of a jump on the crack.
     """
-    nodes = _set_nodes(space, where, what)
+    nodes = _set_nodes(space, where, label)
     parts = [nodes]
     if isinstance(where, str):
-        facets = facet_set(space.mesh, where, what)
-        _check_ends(space, where, facets, what)
+        facets = facet_set(space.mesh, where, label)
+        _check_ends(space, where, facets, label)
         owner = space.mesh.facet_to_cell[space.mesh.facet_numbers(facets), 0]
         facets = facets[space.signature[owner] != 0]
         if len(facets):
@@ -388,7 +388,7 @@ def _functions_of(space: FunctionSpace, where: object, what: str) -> Ints:
     return np.unique(np.concatenate(parts))
 
 
-def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> None:
+def _check_ends(space: FunctionSpace, where: str, facets: Ints, label: str) -> None:
     """Raise where a set ends at a point on a crack and holds its lip - there.
 
     The functions of such a point are those of lip + and of the jump: only their sum is known.
@@ -405,9 +405,9 @@ def _check_ends(space: FunctionSpace, where: str, facets: Ints, what: str) -> No
         if is_cut_off.any():
             x = np.round(space.mesh.points[np.argmax(is_cut_off)], 6).tolist()
             raise ProblemError(
-                f"{what}({value_text(where)}) ends at {x}, where crack {c} meets the boundary, and "
-                "supports its lip - only: give the points of the crack in the reverse order (the "
-                "supported lip is then lip +), or move its mouth by a thousandth of a cell."
+                f"{label}({value_text(where)}) ends at {x}, where crack {c} meets the boundary, "
+                "and supports its lip - only: give the points of the crack in the reverse order "
+                "(the supported lip is then lip +), or move its mouth by a thousandth of a cell."
             )
 
 
@@ -430,12 +430,12 @@ def _traces(space: FunctionSpace, facets: Ints) -> tuple[Points, Ints, Ints, Flo
 
 def _imposed_part(space: FunctionSpace, support: Support) -> list[tuple[int, Ints, Floats, int]]:
     """Axis, functions, values and number of fitted values of an imposed displacement."""
-    where, what = support.where, support.kind
-    nodes = _set_nodes(space, where, what)
+    where, label = support.where, support.kind
+    nodes = _set_nodes(space, where, label)
     if not isinstance(where, str):
         u = support.displacement_at(space.node_points[nodes])
         return [(axis, nodes, u[:, axis], 0) for axis in _axes(u)]
-    _check_ends(space, where, facet_set(space.mesh, where, support.name), what)
+    _check_ends(space, where, facet_set(space.mesh, where, support.name), label)
     fitted_functions, coefficients = _fit(space, support)
     other_nodes = nodes[~np.isin(nodes, fitted_functions[fitted_functions < space.n_nodes])]
     parts = [coefficients]

@@ -93,13 +93,13 @@ def ligament_yields(rule: GrowthRule, step: Step) -> str:
 
     first = f"of {place_name(step, *ligament.tip)}, {size(ligament.tip):.4g}"
     if ligament.second_tip is None:
-        what = f"the plastic zone {first}, fills the {ligament.length:.4g} to {ligament.name}"
+        label = f"the plastic zone {first}, fills the {ligament.length:.4g} to {ligament.name}"
     else:
-        what = (
+        label = (
             f"the plastic zones {first}, and of {place_name(step, *ligament.second_tip)}, "
             f"{size(ligament.second_tip):.4g}, fill the {ligament.length:.4g} between them"
         )
-    return f"ligament yield: {what}"
+    return f"ligament yield: {label}"
 
 
 def _filled_shares(rule: GrowthRule, step: Step) -> list[tuple[float, Ligament]]:
@@ -332,12 +332,12 @@ def refusal_of(rule: GrowthRule, step: Step) -> str:
             f"size {plan.cell[plan.tip]:.4g}): the mesh cannot see it. Take a larger {remedy} or a "
             "finer mesh around the tip."
         )
-    what = "it falls to zero"
+    label = "it falls to zero"
     if rule.threshold > 0:
-        what = f"dK_eq falls below the threshold {rule.threshold:.6g}"
+        label = f"dK_eq falls below the threshold {rule.threshold:.6g}"
     if rule.retardation is not None:
-        what += ", or retardation all but stops it,"
-    return f"rate is zero: {what} within a tenth of a cell at every tip, as of {place}"
+        label += ", or retardation all but stops it,"
+    return f"rate is zero: {label} within a tenth of a cell at every tip, as of {place}"
 
 
 def cannot_go_on(step: Step, reason: object) -> str:

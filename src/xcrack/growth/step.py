@@ -125,7 +125,7 @@ class Join(Event):
         return f"cracks {first_crack} and {second_crack} join at {place}, N = {self.N:.6g}"
 
 
-def checked_joins(value: Sequence[Join], what: str) -> tuple[Join, ...]:
+def checked_joins(value: Sequence[Join], label: str) -> tuple[Join, ...]:
     """Joins as a tuple.
 
     Raises
@@ -133,10 +133,10 @@ def checked_joins(value: Sequence[Join], what: str) -> tuple[Join, ...]:
     ProblemError
         One of them is no `Join`.
     """
-    join_entries = entries(value, what)
+    join_entries = entries(value, label)
     for join in join_entries:
         if not isinstance(join, Join):
-            raise ProblemError(f"{what}: {value_text(join)} is none: give a tuple of Join.")
+            raise ProblemError(f"{label}: {value_text(join)} is none: give a tuple of Join.")
     return join_entries
 
 

@@ -651,9 +651,9 @@ class _SetTable:
     """Sets of nodes or elements by name; a set may name others that come before it."""
 
     def __init__(
-        self, what: str, numbers: dict[tuple[str, int], int], instances: tuple[str, ...]
+        self, kind: str, numbers: dict[tuple[str, int], int], instances: tuple[str, ...]
     ) -> None:
-        self.what, self.numbers, self.instances = what, numbers, instances
+        self.kind, self.numbers, self.instances = kind, numbers, instances
         self.set_by_key: dict[tuple[str, str], NamedSet] = {}
 
     def add(self, line: DeckLine, name: str, members: list[int] | None) -> None:
@@ -676,7 +676,7 @@ class _SetTable:
 
     def members(self, entry: str, line: DeckLine, number: int | None) -> Ints:
         return _members(
-            entry, line, number, self.numbers, self.set_by_key, self.what, self.instances
+            entry, line, number, self.numbers, self.set_by_key, self.kind, self.instances
         )
 
     def _generated_numbers(self, line: DeckLine, number: int, entries: list[str]) -> Ints:
@@ -728,7 +728,7 @@ def _members(
     number: int | None,
     numbers: dict[tuple[str, int], int],
     sets: dict[tuple[str, str], NamedSet],
-    what: str,
+    kind: str,
     instances: Sequence[str],
 ) -> Ints:
     """Rows that an entry names; an error where the deck has none of that name or number."""
@@ -747,13 +747,13 @@ def _members(
                 return np.array([numbers[owner, label]], dtype=np.int64)
         location = f" in instance {scope}" if scope else ""
         keyword.refuse(
-            f"the deck has no {what} {label}{location}: give the number of one that it has.", number
+            f"the deck has no {kind} {label}{location}: give the number of one that it has.", number
         )
     named_set = _find(sets, entry, scope, instances)
     if named_set is None:
         names = ", ".join(dict.fromkeys(entry_set.name for entry_set in sets.values()))
         keyword.refuse(
-            f"the deck has no {what} set {value_text(entry)} before this line; it has "
+            f"the deck has no {kind} set {value_text(entry)} before this line; it has "
             f"{names or 'none'}: give one of them.", number
         )  # fmt: skip
     return named_set.members

@@ -213,8 +213,8 @@ class _Archive:
         arrays = {kind: np.array(rows, dtype=np.int64) for kind, rows in blocks.items()}
         sets: list[tuple[str, str, Ints]] = []
         point_sets: list[tuple[str, Ints]] = []
-        for name, what, members in self.components:
-            if what.startswith("NODE"):
+        for name, entity, members in self.components:
+            if entity.startswith("NODE"):
                 node_rows = [self.rows[m] for m in members if m in self.rows]
                 point_sets.append((name, np.array(node_rows, dtype=np.int64)))
                 continue

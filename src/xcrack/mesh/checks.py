@@ -120,32 +120,32 @@ def checked_sets(
     MeshError
         Not mappings from names to arrays of the right shape, or numbers out of range.
     """
-    for what, sets in (("facet_sets", facet_sets), ("cell_sets", cell_sets)):
+    for label, sets in (("facet_sets", facet_sets), ("cell_sets", cell_sets)):
         if not isinstance(sets, Mapping) or not all(isinstance(name, str) for name in sets):
             raise MeshError(
-                f"{what}: give a dict of names and arrays, such as {what}={{'left': ...}}, not "
+                f"{label}: give a dict of names and arrays, such as {label}={{'left': ...}}, not "
                 f"{type(sets).__name__}{' with other keys' * isinstance(sets, Mapping)}."
             )
     facets, cells = {}, {}
     for name, members in facet_sets.items():
-        what = f"facet set {value_text(name)}"
-        array = whole_numbers(members, what, error=MeshError)
+        label = f"facet set {value_text(name)}"
+        array = whole_numbers(members, label, error=MeshError)
         facets[name] = (
-            whole_numbers(array, what, (None, dim), error=MeshError)
+            whole_numbers(array, label, (None, dim), error=MeshError)
             if array.size
             else np.zeros((0, dim), dtype=np.int64)
         )
         if array.size and (array.min() < 0 or array.max() >= n_points):
             raise MeshError(
-                f"{what} names points beyond the {n_points} of the mesh; points are numbered "
+                f"{label} names points beyond the {n_points} of the mesh; points are numbered "
                 "from 0."
             )
     for name, members in cell_sets.items():
-        what = f"cell set {value_text(name)}"
-        array = whole_numbers(members, what, (None,), error=MeshError)
+        label = f"cell set {value_text(name)}"
+        array = whole_numbers(members, label, (None,), error=MeshError)
         if array.size and (array.min() < 0 or array.max() >= n_cells):
             raise MeshError(
-                f"{what} names cells beyond the {n_cells} of the mesh; cells are numbered from 0."
+                f"{label} names cells beyond the {n_cells} of the mesh; cells are numbered from 0."
             )
         cells[name] = array
     return facets, cells

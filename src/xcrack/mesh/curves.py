@@ -95,10 +95,10 @@ def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, far_ratio
     """Nearest points of a curve, no farther than `far_ratio` times the size of the facets there."""
     if not len(x):
         return x
-    what = f"curves[{name!r}]"
+    label = f"curves[{name!r}]"
     result = numbers(
-        call_function(curve, f"the nearest points of {what}", x.copy()),
-        what,
+        call_function(curve, f"the nearest points of {label}", x.copy()),
+        label,
         x.shape,
         error=MeshError,
     )
@@ -107,7 +107,7 @@ def _nearest_points(name: str, curve: Curve, x: Floats, reach: Floats, far_ratio
     if is_far.any():
         i = int(np.argmax(np.where(is_far, distance, 0)))
         raise MeshError(
-            f"{what} takes the point {at(x[i])} of the boundary to {at(result[i])}, "
+            f"{label} takes the point {at(x[i])} of the boundary to {at(result[i])}, "
             f"{distance[i]:.4g} away, where facets are {reach[i]:.4g} long ({int(is_far.sum())} "
             f"such points): it must return the nearest points of the curve for which the set "
             f"stands."

@@ -251,28 +251,28 @@ def write_mesh(
 
 
 def _write_text(path: Path, text: str) -> None:
-    what = "the mesh is not written (an older file is left as it was) to"
-    with written_whole(path, what) as part:
+    label = "the mesh is not written (an older file is left as it was) to"
+    with written_whole(path, label) as part:
         part.write_text(text, encoding="utf-8")
 
 
-def existing_file(value: str | PathLike[str], what: str) -> Path:
+def existing_file(value: str | PathLike[str], label: str) -> Path:
     """Path of a file that is there."""
     path = Path(value)
-    with system_errors(f"cannot read the {what} file", path):
+    with system_errors(f"cannot read the {label} file", path):
         if path.is_dir():
             raise XcrackError(
-                f"{what} file {str(path)!r} is a folder: give the path of a file in it."
+                f"{label} file {str(path)!r} is a folder: give the path of a file in it."
             )
         if not path.exists():
             raise XcrackError(
-                f"{what} file {str(path)!r} does not exist (looked in {Path.cwd()}): check the "
+                f"{label} file {str(path)!r} does not exist (looked in {Path.cwd()}): check the "
                 "path."
             )
     return path
 
 
-def meshio_read(path: Path, what: str) -> Any:
+def meshio_read(path: Path, label: str) -> Any:
     """Content of a file as meshio reads it; errors name the file and what to do."""
     meshio = require_package("meshio", f"reading a {path.suffix} file")
     _check_extension(path, "read", meshio.extension_to_filetypes)
@@ -299,7 +299,7 @@ def meshio_read(path: Path, what: str) -> Any:
         else:
             reason = " ".join(f"{output.getvalue()} {error}".split()) or type(error).__name__
         raise MeshError(
-            f"cannot read the {what} file {str(path)!r}: {reason.rstrip('.')}. Check that it is a "
+            f"cannot read the {label} file {str(path)!r}: {reason.rstrip('.')}. Check that it is a "
             f"whole {path.suffix} file. {_conversion(path)}".rstrip()
         ) from error
 

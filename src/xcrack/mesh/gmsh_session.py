@@ -195,7 +195,7 @@ def graded_size(
     return length
 
 
-def polylines(value: Any, what: str, error: type[XcrackError]) -> list[Floats]:
+def polylines(value: Any, label: str, error: type[XcrackError]) -> list[Floats]:
     """One polyline or several in one form, checked.
 
     Examples
@@ -206,12 +206,12 @@ def polylines(value: Any, what: str, error: type[XcrackError]) -> list[Floats]:
     try:
         has_many = bool(np.ndim(value[0][0]))
         return [
-            point_coordinates(path, what, (None, 2), error=error)
+            point_coordinates(path, label, (None, 2), error=error)
             for path in (value if has_many else [value])
         ]
     except Exception as cause:  # whatever an object's own methods raise
         raise error(
-            f"{what} = {value_text(value)} must be points of a polyline, [(x0, y0), (x1, y1), "
+            f"{label} = {value_text(value)} must be points of a polyline, [(x0, y0), (x1, y1), "
             "...], or a list of such polylines, with finite coordinates."
         ) from cause
 

@@ -36,7 +36,7 @@ class RoundHole:
         return np.asarray(x @ self.section.T - self.centre)
 
 
-def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
+def round_hole(mesh: Mesh, facets: Ints, label: str) -> RoundHole:
     """Fit a circle (2D) or a cylinder (3D) to facets of the boundary.
 
     Parameters
@@ -44,7 +44,7 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
     mesh : Mesh
     facets : (k, d) array of int
         On the boundary.
-    what : str
+    label : str
         The load, for messages.
 
     Raises
@@ -53,14 +53,14 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
         The facets are not the wall of a round hole, or lie inside the body.
     """
     if not len(facets):
-        raise ProblemError(f"{what}: the set has no facets.")
-    area = outward_areas(mesh, facets, what)
-    section = _straightened_axes(mesh.points[np.unique(facets)], _section(area, what))
+        raise ProblemError(f"{label}: the set has no facets.")
+    area = outward_areas(mesh, facets, label)
+    section = _straightened_axes(mesh.points[np.unique(facets)], _section(area, label))
     x = mesh.points[np.unique(facets)] @ section.T
     A = np.column_stack([2 * x, np.ones(len(x))])
     solution, _, rank, _ = np.linalg.lstsq(A, (x**2).sum(axis=1), rcond=1e-10)
     if rank < 3:
-        raise ProblemError(f"{what}: the set is straight, not the wall of a round hole.")
+        raise ProblemError(f"{label}: the set is straight, not the wall of a round hole.")
     centre = solution[:2]
     distance = np.linalg.norm(x - centre, axis=1)
     radius = float(distance.mean())
@@ -68,13 +68,13 @@ def round_hole(mesh: Mesh, facets: Ints, what: str) -> RoundHole:
     hole = RoundHole(centre, section, radius)
     if deviation > _ROUND:
         raise ProblemError(
-            f"{what}: the set is not a round hole: its points lie up to {100 * deviation:.3g} % of "
-            f"the radius {radius:.4g} off the best circle. Give the facets of one hole."
+            f"{label}: the set is not a round hole: its points lie up to {100 * deviation:.3g} % "
+            f"of the radius {radius:.4g} off the best circle. Give the facets of one hole."
         )
     middle = hole.section_places(mesh.points[facets].mean(axis=1))
     if (np.einsum("ks,ks->k", middle, area @ section.T) > 0).any():
         raise ProblemError(
-            f"{what}: the set is round, but no hole: the body lies inside of it, at least in "
+            f"{label}: the set is round, but no hole: the body lies inside of it, at least in "
             "places. A pin presses on the wall of a hole."
         )
     return hole
@@ -105,7 +105,7 @@ def _straightened_axes(x: Floats, section: Floats) -> Floats:
     return section
 
 
-def _section(area: Floats, what: str) -> Floats:
+def _section(area: Floats, label: str) -> Floats:
     """Directions across the axis: in 2D all, in 3D those in which the normals of the wall lie."""
     if area.shape[1] < 3:
         return np.eye(2)
@@ -115,6 +115,6 @@ def _section(area: Floats, what: str) -> Floats:
     if share[0] > _ALONG or share[1] < _ALONG:
         kind = "plane" if share[1] < _ALONG else "not a cylinder"
         raise ProblemError(
-            f"{what}: the set is {kind}: give the facets of the wall of one round hole only."
+            f"{label}: the set is {kind}: give the facets of the wall of one round hole only."
         )
     return np.asarray(direction[:, 1:].T)

@@ -85,7 +85,7 @@ class Keyword:
         raise error(f"{self.path.name}, line {line or self.line}: *{self.name}: {words}")
 
     def number(
-        self, text: str, line: int, what: str = "a number", default: float | None = None
+        self, text: str, line: int, label: str = "a number", default: float | None = None
     ) -> float:
         """An entry as a finite number; an empty one is the default, where there is one."""
         if not text and default is not None:
@@ -95,15 +95,15 @@ class Keyword:
         except ValueError:
             value = float("nan")
         if not abs(value) < float("inf"):
-            self.refuse(f"{text!r:.40} is no finite number: give {what}.", line)
+            self.refuse(f"{text!r:.40} is no finite number: give {label}.", line)
         return value
 
-    def whole_number(self, text: str, line: int, what: str) -> int:
+    def whole_number(self, text: str, line: int, label: str) -> int:
         """An entry as a whole number."""
         try:
             return int(text)
         except ValueError:
-            self.refuse(f"{text!r:.40} is no whole number: give {what}.", line)
+            self.refuse(f"{text!r:.40} is no whole number: give {label}.", line)
 
     def option(self, name: str) -> str:
         """An option that must be there."""

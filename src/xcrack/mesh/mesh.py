@@ -366,11 +366,11 @@ class Mesh:
         sets = {}
         for name, members in cell_sets.items():
             if callable(members):
-                what = f"with_cell_sets: the function of {value_text(name)}"
-                flags = np.asarray(call_function(members, what, middle))
+                label = f"with_cell_sets: the function of {value_text(name)}"
+                flags = np.asarray(call_function(members, label, middle))
                 if flags.shape != (len(middle),) or flags.dtype != bool:
                     raise MeshError(
-                        f"{what} returned {flags.dtype} of shape {flags.shape}: return True or "
+                        f"{label} returned {flags.dtype} of shape {flags.shape}: return True or "
                         f"False for each of the {len(middle)} cells, as x[:, 0] < 1.0 does."
                     )
                 members = np.nonzero(flags)[0]
@@ -493,44 +493,44 @@ def local_facets(dim: int) -> Ints:
 # Named sets of facets, and the mesh point nearest to a place.
 
 
-def facet_set(mesh: Mesh, name: str, what: str) -> Ints:
+def facet_set(mesh: Mesh, name: str, label: str) -> Ints:
     """Facets of a set by name; an error lists the known names."""
     if name not in mesh.facet_sets:
         set_names = ", ".join(repr(n) for n in mesh.facet_sets)
         raise ProblemError(
-            f"{what}: the mesh has no facet set {value_text(name)}; it has {set_names}."
+            f"{label}: the mesh has no facet set {value_text(name)}; it has {set_names}."
         )
     return mesh.facet_sets[name]
 
 
-def nearest_point(mesh: Mesh, x: Floats, what: str) -> int:
+def nearest_point(mesh: Mesh, x: Floats, label: str) -> int:
     """Number of the mesh point nearest to x; an error where x is not in or at the body."""
     if len(x) != mesh.dim:
-        raise ProblemError(f"{what}: the point {x.tolist()} needs {mesh.dim} coordinates.")
+        raise ProblemError(f"{label}: the point {x.tolist()} needs {mesh.dim} coordinates.")
     distance = np.linalg.norm(mesh.points - x, axis=1)
     number = int(np.argmin(distance))
     if distance[number] > mesh.cell_size.max():
         raise ProblemError(
-            f"{what}: {x.tolist()} is {distance[number]:.4g} away from the nearest mesh point "
+            f"{label}: {x.tolist()} is {distance[number]:.4g} away from the nearest mesh point "
             f"{mesh.points[number].tolist()}: give a point of the body."
         )
     return number
 
 
-def nearest_nodes(mesh: Mesh, x: Floats, what: str) -> Ints:
+def nearest_nodes(mesh: Mesh, x: Floats, label: str) -> Ints:
     """Numbers of the mesh points or middles of edges nearest to points `(k, d)`.
 
     The middle of edge e has the number ``n_points + e``. An error names the farthest point that is
     not in or at the body.
     """
     if x.shape[1] != mesh.dim:
-        raise ProblemError(f"{what}: the points need {mesh.dim} coordinates, not {x.shape[1]}.")
+        raise ProblemError(f"{label}: the points need {mesh.dim} coordinates, not {x.shape[1]}.")
     places = np.concatenate([mesh.points, mesh.edge_middles])
     distance, number = cKDTree(places).query(x)
     worst_point = int(np.argmax(distance))
     if distance[worst_point] > mesh.cell_size.max():
         raise ProblemError(
-            f"{what}: {x[worst_point].tolist()} is {distance[worst_point]:.4g} away from the "
+            f"{label}: {x[worst_point].tolist()} is {distance[worst_point]:.4g} away from the "
             f"nearest mesh point {places[number[worst_point]].tolist()}: give points of the body."
         )
     return np.asarray(number, dtype=np.int64)

@@ -63,11 +63,11 @@ class Card:
         """Raise an error that names file, line and card."""
         raise MeshError(f"{self.path.name}, line {self.line}: {self.name}: {words}")
 
-    def whole_number(self, k: int, what: str) -> int:
+    def whole_number(self, k: int, label: str) -> int:
         """A field as a whole number above zero."""
         text = self.fields[k] if k < len(self.fields) else ""
         if not text.isdecimal() or not int(text) or len(text) > 18:
-            self.refuse(f"{text!r:.40} is no whole number above 0: give {what}.")
+            self.refuse(f"{text!r:.40} is no whole number above 0: give {label}.")
         return int(text)
 
     def coordinate(self, k: int) -> float:

@@ -207,10 +207,10 @@ def split_sides(sides: Sequence[Side], sets: Mapping[str, Any]) -> list[Side]:
     limits: list[tuple[int, float, Callable[[Floats], Bools]]] = []
     for name, choice in sets.items():
         if not callable(choice) and not _are_numbers(choice):
-            what = f"sets[{name!r}]"
+            label = f"sets[{name!r}]"
             limits += [
-                (axis, value, selector(choice, 2, what))
-                for corner in box_of(choice, 2, what)
+                (axis, value, selector(choice, 2, label))
+                for corner in box_of(choice, 2, label)
                 for axis, value in enumerate(corner.tolist())
                 if np.isfinite(value)
             ]

@@ -70,7 +70,7 @@ def part(
     )
 
 
-def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints:
+def chosen_facets(points: Floats, facets: Ints, where: Where, label: str) -> Ints:
     """Facets whose middle is in a box, or where a function says so.
 
     Raises
@@ -78,12 +78,12 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
     MeshError
         There are none, or `where` is something else.
     """
-    is_inside = selector(where, points.shape[1], what)
+    is_inside = selector(where, points.shape[1], label)
     middle = points[facets].mean(axis=1)
     is_chosen = is_inside(middle)
     if not is_chosen.any():
         raise MeshError(
-            f"{what} has no facets: the middles of the {len(facets)} facets reach from "
+            f"{label} has no facets: the middles of the {len(facets)} facets reach from "
             f"{at(middle.min(axis=0))} to {at(middle.max(axis=0))}: choose some of them."
         )
     size = _sizes(points[facets])
@@ -93,25 +93,25 @@ def chosen_facets(points: Floats, facets: Ints, where: Where, what: str) -> Ints
     facet_area = float(size[is_chosen].sum())
     if abs(facet_area - area) > _ENDS * facet_area:
         warn(
-            f"{what} has facets of {facet_area:.4g} in all, where {area:.4g} lie within what was "
+            f"{label} has facets of {facet_area:.4g} in all, where {area:.4g} lie within what was "
             "asked for: its ends lie within facets. Refine the mesh there, or put points of the "
             "mesh at the ends."
         )
     return facets[is_chosen]
 
 
-def selector(where: Where, dim: int, what: str) -> Callable[[Floats], Bools]:
+def selector(where: Where, dim: int, label: str) -> Callable[[Floats], Bools]:
     """A function of points by a box or a user's function, checked."""
     if callable(where):
-        return lambda x: _values_at(where, x, what)
-    low_corner, high_corner = box_of(where, dim, what)
+        return lambda x: _values_at(where, x, label)
+    low_corner, high_corner = box_of(where, dim, label)
     ends = np.concatenate([low_corner, high_corner])
     reach = 1e-9 * np.abs(ends[np.isfinite(ends)]).max(initial=0.0)  # a box may be flat
     low_corner, high_corner = low_corner - reach, high_corner + reach
     return lambda x: np.asarray(((x >= low_corner) & (x <= high_corner)).all(axis=1))
 
 
-def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
+def box_of(where: Any, dim: int, label: str) -> tuple[Floats, Floats]:
     """Corners of a box, infinite where it has no end.
 
     Raises
@@ -125,32 +125,32 @@ def box_of(where: Any, dim: int, what: str) -> tuple[Floats, Floats]:
         corners = []
     if len(corners) != 2 or any(len(corner) != dim for corner in corners):
         raise MeshError(
-            f"{what}: {value_text(where)}: give a function f(x) -> bools, or two corners of "
+            f"{label}: {value_text(where)}: give a function f(x) -> bools, or two corners of "
             f"{dim} numbers each, None where the box has no end."
         )
     padded = [[0.0 if v is None else v for v in corner] for corner in corners]
-    rows = numbers(padded, f"{what}: corners of the box", (2, dim), error=MeshError)
+    rows = numbers(padded, f"{label}: corners of the box", (2, dim), error=MeshError)
     is_open = np.array([[v is None for v in corner] for corner in corners])
     low_corner, high_corner = np.where(is_open, [[-np.inf], [np.inf]], rows)
     if (low_corner > high_corner).any():
         raise MeshError(
-            f"{what}: the box from {low_corner.tolist()} to {high_corner.tolist()} is inside out: "
+            f"{label}: the box from {low_corner.tolist()} to {high_corner.tolist()} is inside out: "
             "swap them."
         )
     return low_corner, high_corner
 
 
-def _values_at(function: Callable[[Floats], Any], x: Floats, what: str) -> Bools:
-    result = call_function(function, f"the choice of {what}", x.copy())
+def _values_at(function: Callable[[Floats], Any], x: Floats, label: str) -> Bools:
+    result = call_function(function, f"the choice of {label}", x.copy())
     try:
         is_inside = np.asarray(result)
     except Exception as error:  # ragged rows, or what an object's own __array__ raises
         raise MeshError(
-            f"{what}: the function returned {value_text(result)}: return one bool for each point."
+            f"{label}: the function returned {value_text(result)}: return one bool for each point."
         ) from error
     if is_inside.shape != (len(x),) or is_inside.dtype != bool:
         raise MeshError(
-            f"{what}: the function returned shape {is_inside.shape} of {is_inside.dtype} for "
+            f"{label}: the function returned shape {is_inside.shape} of {is_inside.dtype} for "
             f"{len(x)} points: return one bool for each."
         )
     return is_inside

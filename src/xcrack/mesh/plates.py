@@ -52,25 +52,25 @@ _STEEPEST = 0.5  # growth of the cell size a unit of distance that still gives g
 _MOST_POINTS = 5_000_000
 
 
-def checked_holes(value: Any, what: str, error: Error) -> list[Hole]:
+def checked_holes(value: Any, label: str, error: Error) -> list[Hole]:
     """Centres and radii of holes, checked."""
     try:
-        pairs = [(center, radius) for center, radius in entries(value, what, error=error)]
+        pairs = [(center, radius) for center, radius in entries(value, label, error=error)]
     except (error, TypeError, ValueError):
         raise error(
-            f"{what} = {value_text(value)} must be a list of centres and radii, such as "
+            f"{label} = {value_text(value)} must be a list of centres and radii, such as "
             "[((x, y), radius)]."
         ) from None
     return [
         (
-            _pair(point_coordinates(center, f"{what}[{i}]: centre", (2,), error=error)),
-            number(radius, f"{what}[{i}]: radius", above=0, most=LARGEST, error=error),
+            _pair(point_coordinates(center, f"{label}[{i}]: centre", (2,), error=error)),
+            number(radius, f"{label}[{i}]: radius", above=0, most=LARGEST, error=error),
         )
         for i, (center, radius) in enumerate(pairs)
     ]
 
 
-def checked_outline(value: Any, what: str, error: Error) -> list[Side]:
+def checked_outline(value: Any, label: str, error: Error) -> list[Side]:
     """Sides of an outline, checked."""
     return sides_of(value)
 

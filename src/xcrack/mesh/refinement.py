@@ -470,15 +470,15 @@ def _to_size(mesh: Mesh, size_at: Callable[[Floats, Ints], Floats], sweeps: int 
 
 def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
     """Wanted size of cells, checked as it is asked for."""
-    what, least_size = "the size of refine", FINEST * mesh.extent
+    label, least_size = "the size of refine", FINEST * mesh.extent
     function = size if callable(size) else None
 
     def size_at(centre: Floats, parent: Ints) -> Floats:
-        sizes = size if function is None else call_function(function, what, centre.copy())
-        value = numbers(sizes, what, must_be_finite=False, error=MeshError)
+        sizes = size if function is None else call_function(function, label, centre.copy())
+        value = numbers(sizes, label, must_be_finite=False, error=MeshError)
         if value.shape not in ((), (len(centre),)):
             raise MeshError(
-                f"{what} has the shape {value.shape} at {len(centre)} centres: return one number "
+                f"{label} has the shape {value.shape} at {len(centre)} centres: return one number "
                 "for each."
             )
         value = np.broadcast_to(value, len(centre))
@@ -486,7 +486,7 @@ def _checked_size(mesh: Mesh, size: Size) -> Callable[[Floats, Ints], Floats]:
         if is_invalid.any():
             i = int(np.argmax(is_invalid))
             raise MeshError(
-                f"{what} is {value[i]:g} at {at(centre[i])} ({int(is_invalid.sum())} such cells): "
+                f"{label} is {value[i]:g} at {at(centre[i])} ({int(is_invalid.sum())} such cells): "
                 f"it must be a length, no less than a millionth of the body ({least_size:.3g})."
             )
         return value

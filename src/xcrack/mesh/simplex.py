@@ -191,14 +191,14 @@ def leg_sizes(mesh: Mesh, cells: Ints) -> Floats:
 # Area vectors of boundary facets.
 
 
-def outward_areas(mesh: Mesh, facets: Ints, what: str) -> Floats:
+def outward_areas(mesh: Mesh, facets: Ints, label: str) -> Floats:
     """Outward normal of each facet times its length (2D) or area (3D), `(k, d)`.
 
     Parameters
     ----------
     mesh : Mesh
     facets : (k, d) array of int
-    what : str
+    label : str
         For messages.
 
     Raises
@@ -211,7 +211,7 @@ def outward_areas(mesh: Mesh, facets: Ints, what: str) -> Floats:
     is_inner = mesh.facet_to_cell[number, 1] >= 0
     if is_inner.any():
         raise ProblemError(
-            f"{what}: {int(is_inner.sum())} of its facets lie inside the body; loads act on the "
+            f"{label}: {int(is_inner.sum())} of its facets lie inside the body; loads act on the "
             "boundary only."
         )
     place = np.argmax(mesh.cell_to_facet[cell] == number[:, None], axis=1)

@@ -316,10 +316,10 @@ def _is_box(selector: Any) -> bool:
     return isinstance(selector, Sequence) and [np.ndim(corner) for corner in selector] == [1, 1]
 
 
-def _within_box(corners: Any, what: str) -> Callable[[Floats], Bools]:
+def _within_box(corners: Any, label: str) -> Callable[[Floats], Bools]:
     """A selector by two corners, in the plane of a sheet also of two numbers each."""
     n = 2 if len(corners[0]) == 2 else 3
-    low_corner, high_corner = box_of(corners, n, what)
+    low_corner, high_corner = box_of(corners, n, label)
     reach = (
         _ON_BOX
         * np.where(np.isfinite(high_corner - low_corner), high_corner - low_corner, 0.0).max()

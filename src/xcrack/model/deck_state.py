@@ -439,8 +439,8 @@ class DeckState:
             elements, faces, label = self._loaded_faces(line, number, row[0], label)
             by_number = keyword.name == "DLOAD" and row[0].rpartition(".")[2].isdigit()
             target = "" if by_number else row[0]
-            what = keyword.place if by_number else target.casefold()
-            key = (keyword.name, what, row[1].upper(), str(numbers) if by_number else "")
+            place = keyword.place if by_number else target.casefold()
+            key = (keyword.name, place, row[1].upper(), str(numbers) if by_number else "")
             load = self.spread.get(key)
             if load is None or load.step != step:
                 load = SpreadLoad(label, target, [], [], [], numbers, step, line, number)

@@ -388,11 +388,11 @@ class Isotropic(Material):
         )
 
 
-def _tensors(value: object, what: str) -> Floats:
-    tensors = numbers(value, what)
+def _tensors(value: object, label: str) -> Floats:
+    tensors = numbers(value, label)
     if tensors.shape[-2:] not in ((2, 2), (3, 3)):
         raise ProblemError(
-            f"{what} has the shape {tensors.shape}: give (..., 2, 2) or (..., 3, 3)."
+            f"{label} has the shape {tensors.shape}: give (..., 2, 2) or (..., 3, 3)."
         )
     return tensors
 

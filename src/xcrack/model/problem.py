@@ -76,20 +76,20 @@ _MOST = 1e3  # beyond, faces that press never slip
 
 
 def friction_coefficients(
-    value: Any, what: str, error: type[XcrackError]
+    value: Any, label: str, error: type[XcrackError]
 ) -> float | tuple[float, ...]:
     """Coefficients of friction, checked: one for all cracks, or one for each."""
     if isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0):
-        return number(value, what, least=0, most=_MOST, error=error)
-    message = f"{what} = {value_text(value)}: give a number, or a list of one a crack."
+        return number(value, label, least=0, most=_MOST, error=error)
+    message = f"{label} = {value_text(value)}: give a number, or a list of one a crack."
     if isinstance(value, AnySet):
         raise error(message)
     try:
-        given_values = entries(value, what, error=error)
+        given_values = entries(value, label, error=error)
     except error:
         raise error(message) from None
     return tuple(
-        number(mu, f"{what}[{c}]", least=0, most=_MOST, error=error)
+        number(mu, f"{label}[{c}]", least=0, most=_MOST, error=error)
         for c, mu in enumerate(given_values)
     )
 
@@ -451,27 +451,27 @@ def problem_with_cracks(
     return result
 
 
-def check_problem(problem: Any, what: str) -> None:
+def check_problem(problem: Any, label: str) -> None:
     """Raise where a function that needs a problem was given something else."""
     if not isinstance(problem, Problem):
         raise ProblemError(
-            f"{what}: give a Problem(mesh, material, ...), not {type(problem).__name__}."
+            f"{label}: give a Problem(mesh, material, ...), not {type(problem).__name__}."
         )
 
 
 CrackNumber = Annotated[int, Whole(least=0)]
 
 
-def crack_number(problem: Problem, crack: int, what: str) -> int:
+def crack_number(problem: Problem, crack: int, label: str) -> int:
     """A crack by its number, if the problem has it."""
     n = len(problem.cracks)
     if not n:
         raise ProblemError(
-            f"{what}: crack {value_text(crack)}: the problem has no crack: give one with."
+            f"{label}: crack {value_text(crack)}: the problem has no crack: give one with."
         )
     if crack >= n:
         raise ProblemError(
-            f"{what}: crack {value_text(crack)}: the problem has {n} crack(s), numbered from 0."
+            f"{label}: crack {value_text(crack)}: the problem has {n} crack(s), numbered from 0."
         )
     return crack
 

@@ -26,22 +26,22 @@ class VectorField(Rule):
     may_be_free: bool = False
     is_vector = True
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The function, a read-only vector, or a tuple with None."""
         if callable(value):
             return value
         is_sequence = self.may_be_free and isinstance(value, list | tuple)
         if is_sequence and len(value) in (2, 3) and all(v is None for v in value):
-            raise error(f"{what} = {value_text(value)}: give a number in one direction or more.")
+            raise error(f"{label} = {value_text(value)}: give a number in one direction or more.")
         if is_sequence and any(v is None or callable(v) for v in value) and len(value) in (2, 3):
             return tuple(
-                v if v is None or callable(v) else number(v, f"{what}[{i}]", error=error)
+                v if v is None or callable(v) else number(v, f"{label}[{i}]", error=error)
                 for i, v in enumerate(value)
             )
-        vector = numbers(value, what, (None,), error=error)
+        vector = numbers(value, label, (None,), error=error)
         if len(vector) not in (2, 3):
             raise error(
-                f"{what} = {value_text(value)}: give a vector of 2 or 3 numbers, or a function."
+                f"{label} = {value_text(value)}: give a vector of 2 or 3 numbers, or a function."
             )
         return frozen_copy(vector)
 
@@ -52,9 +52,9 @@ class ScalarField(Rule):
 
     unit: Unit = NUMBER
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The function, or the number as float."""
-        return value if callable(value) else number(value, what, error=error)
+        return value if callable(value) else number(value, label, error=error)
 
 
 @dataclass(frozen=True)
@@ -64,15 +64,15 @@ class StressField(Rule):
     unit: Unit = NUMBER
     is_vector = True
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The function, or a read-only matrix."""
         if callable(value):
             return value
-        sigma = numbers(value, what, (None, None), error=error)
+        sigma = numbers(value, label, (None, None), error=error)
         if sigma.shape not in ((2, 2), (3, 3)):
-            raise error(f"{what} has the shape {sigma.shape}: give (2, 2) or (3, 3).")
+            raise error(f"{label} has the shape {sigma.shape}: give (2, 2) or (3, 3).")
         if not np.allclose(sigma, sigma.T):
-            raise error(f"{what}: {sigma.tolist()} is not symmetric: give a stress.")
+            raise error(f"{label}: {sigma.tolist()} is not symmetric: give a stress.")
         return frozen_copy(sigma)
 
 
@@ -84,13 +84,13 @@ class Place(Rule):
     is_vector = True
     takes_names = True
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """The name, or read-only points."""
         if isinstance(value, str):
             return value
         shape = (None, None) if np.ndim(_as_array(value)) == 2 else (None,)
         try:
-            return frozen_copy(numbers(value, what, shape, error=error))
+            return frozen_copy(numbers(value, label, shape, error=error))
         except error as cause:
             raise error(f"{cause} Or give the name of a facet set.") from None
 
@@ -102,12 +102,12 @@ class PointRows(Rule):
     unit: Unit = NUMBER
     is_vector = True
 
-    def check(self, value: Any, what: str, error: Error) -> Any:
+    def check(self, value: Any, label: str, error: Error) -> Any:
         """A read-only copy."""
         shape = (None, None) if np.ndim(_as_array(value)) == 2 else (None,)
-        rows = numbers(value, what, shape, error=error)
+        rows = numbers(value, label, shape, error=error)
         if rows.shape[-1] not in (2, 3) or not len(rows):
-            raise error(f"{what} = {value_text(value)}: give 2 or 3 numbers, or rows of them.")
+            raise error(f"{label} = {value_text(value)}: give 2 or 3 numbers, or rows of them.")
         return frozen_copy(rows)
 
 
@@ -123,14 +123,14 @@ def _as_array(value: Any) -> Any:
 class SetName(Rule):
     """The name of a facet set."""
 
-    def check(self, value: Any, what: str, error: Error) -> str:
+    def check(self, value: Any, label: str, error: Error) -> str:
         """The name."""
         if not isinstance(value, str):
-            raise error(f"{what} = {value_text(value)}: give the name of a facet set.")
+            raise error(f"{label} = {value_text(value)}: give the name of a facet set.")
         return value
 
 
-def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) -> Floats:
+def vector_at(value: Any, x: Floats, label: str, normal: Floats | None = None) -> Floats:
     """A vector, f(x) or f(x, normal) at points `(n, d)`, checked; nan where an entry is None.
 
     Raises
@@ -141,27 +141,27 @@ def vector_at(value: Any, x: Floats, what: str, normal: Floats | None = None) ->
     n, d = x.shape
     if isinstance(value, tuple):
         columns = [
-            np.full(n, np.nan) if entry is None else scalar_at(entry, x, what) for entry in value
+            np.full(n, np.nan) if entry is None else scalar_at(entry, x, label) for entry in value
         ]
         return np.stack(columns, axis=1)
     if callable(value):
         takes_normal = normal is not None and _n_positional(value) >= 2
         arguments = (x, normal) if takes_normal else (x,)
-        result = _real_values(call_function(value, f"the value of {what}", *arguments), what)
+        result = _real_values(call_function(value, f"the value of {label}", *arguments), label)
     else:
-        result = numbers(value, what)
+        result = numbers(value, label)
     if result.shape == (d,):
         result = np.broadcast_to(result, (n, d))
     if result.shape != (n, d):
         raise ProblemError(
-            f"{what}: the value has shape {result.shape}, wanted {(n, d)} for {n} points in "
+            f"{label}: the value has shape {result.shape}, wanted {(n, d)} for {n} points in "
             f"{d} dimensions; give a vector of length {d} or a function that returns (n, {d})."
         )
-    _check_finite(result, x, what)
+    _check_finite(result, x, label)
     return result
 
 
-def scalar_at(value: Any, x: Floats, what: str) -> Floats:
+def scalar_at(value: Any, x: Floats, label: str) -> Floats:
     """A number or f(x) at points `(n, d)`, checked `(n,)`.
 
     Raises
@@ -170,20 +170,20 @@ def scalar_at(value: Any, x: Floats, what: str) -> Floats:
         Another shape, or values that are not finite.
     """
     if callable(value):
-        values = _real_values(call_function(value, f"the value of {what}", x), what)
+        values = _real_values(call_function(value, f"the value of {label}", x), label)
     else:
-        values = numbers(value, what)
+        values = numbers(value, label)
     if values.shape not in ((), (len(x),)):
         raise ProblemError(
-            f"{what}: the value has shape {values.shape}, wanted {(len(x),)}; give a number or a "
+            f"{label}: the value has shape {values.shape}, wanted {(len(x),)}; give a number or a "
             "function that returns (n,)."
         )
     result = np.broadcast_to(values, (len(x),))
-    _check_finite(result, x, what)
+    _check_finite(result, x, label)
     return result
 
 
-def stress_at(value: Any, x: Floats, what: str) -> Floats:
+def stress_at(value: Any, x: Floats, label: str) -> Floats:
     """A stress or f(x) at points `(n, d)`, checked `(n, d, d)`.
 
     Raises
@@ -193,37 +193,37 @@ def stress_at(value: Any, x: Floats, what: str) -> Floats:
     """
     d = x.shape[1]
     if callable(value):
-        result = _real_values(call_function(value, f"the value of {what}", x), what)
+        result = _real_values(call_function(value, f"the value of {label}", x), label)
     else:
-        result = numbers(value, what)
+        result = numbers(value, label)
     if result.shape not in ((d, d), (len(x), d, d)):
         raise ProblemError(
-            f"{what}: the value has shape {result.shape}, wanted {(len(x), d, d)} for {len(x)} "
+            f"{label}: the value has shape {result.shape}, wanted {(len(x), d, d)} for {len(x)} "
             f"points in {d} dimensions."
         )
     result = np.broadcast_to(result, (len(x), d, d))
-    _check_finite(result, x, what)
+    _check_finite(result, x, label)
     asymmetry = np.abs(result - np.swapaxes(result, 1, 2)).max(axis=(1, 2), initial=0)
     if (asymmetry > 1e-8 * np.abs(result).max(initial=0.0)).any():
         row = int(np.argmax(asymmetry))
         raise ProblemError(
-            f"{what}: the value at {np.round(x[row], 9).tolist()} is "
+            f"{label}: the value at {np.round(x[row], 9).tolist()} is "
             f"{result[row].tolist()}: a stress must be symmetric."
         )
     return result
 
 
-def _real_values(result: Any, what: str) -> Floats:
+def _real_values(result: Any, label: str) -> Floats:
     """What a function returned: an array of real numbers; others are looked for later."""
-    return numbers(result, f"{what}: the returned value", must_be_finite=False)
+    return numbers(result, f"{label}: the returned value", must_be_finite=False)
 
 
-def _check_finite(result: Floats, x: Floats, what: str) -> None:
+def _check_finite(result: Floats, x: Floats, label: str) -> None:
     is_infinite = ~np.isfinite(result).reshape(len(x), int(np.prod(result.shape[1:]))).all(axis=1)
     if is_infinite.any():
         point = x[np.argmax(is_infinite)]
         raise ProblemError(
-            f"{what}: the value at {np.round(point, 9).tolist()} is "
+            f"{label}: the value at {np.round(point, 9).tolist()} is "
             f"{result[np.argmax(is_infinite)].tolist()}: every value must be finite."
         )
 

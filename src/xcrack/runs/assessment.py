@@ -274,10 +274,10 @@ def _by_resistance(
             [np.linspace(*pair, _PLACES) for pair in zip(length, length[1:])] or [length]
         )
     )
-    what = f"the resistance of step {steps[0].index}"
+    label = f"the resistance of step {steps[0].index}"
     largest_factor = 0.0
     for x in places:
-        K_R = call_function(resistance, what, float(x - length[0]))
+        K_R = call_function(resistance, label, float(x - length[0]))
         K_R = number(K_R, "residual_strength: resistance", least=0)
         K_x = float(np.interp(x, length, size))
         largest_factor = max(largest_factor, K_R / K_x if K_x > 0 else np.inf)

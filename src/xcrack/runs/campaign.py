@@ -502,14 +502,14 @@ def grid(**parameters: Iterable[Any]) -> list[dict[str, Any]]:
     return [dict(zip(lists, combination)) for combination in product(*lists.values())]
 
 
-def _list_of(values: Any, what: str, expectation: str) -> list[Any]:
+def _list_of(values: Any, label: str, expectation: str) -> list[Any]:
     """Entries of whatever can be gone through, but for text and dicts."""
     if not isinstance(values, str | bytes | Mapping):
         try:
             return list(values)
         except TypeError:
             pass
-    raise ProblemError(f"{what} = {value_text(values)}: give {expectation}.")
+    raise ProblemError(f"{label} = {value_text(values)}: give {expectation}.")
 
 
 def _run_through_deaths(

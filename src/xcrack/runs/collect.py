@@ -402,7 +402,7 @@ def _move_aside(
         )
 
 
-def names_of_sets(value: Any, what: str) -> tuple[str, ...]:
+def names_of_sets(value: Any, label: str) -> tuple[str, ...]:
     """A name, or several, as a tuple of texts.
 
     Raises
@@ -414,7 +414,7 @@ def names_of_sets(value: Any, what: str) -> tuple[str, ...]:
     if isinstance(names, Sequence) and names and all(isinstance(n, str) and n for n in names):
         return tuple(names)
     raise ProblemError(
-        f"{what} = {value_text(value)}: give a function of a Step, or names of facet sets."
+        f"{label} = {value_text(value)}: give a function of a Step, or names of facet sets."
     )
 
 

@@ -336,14 +336,14 @@ class History:
         body = self._body(mesh, "History.measures")
         return measures_tables(measures_of_steps(self.steps, body), body)
 
-    def _body(self, mesh: Mesh | None, what: str) -> Mesh:
+    def _body(self, mesh: Mesh | None, label: str) -> Mesh:
         body = self.mesh if mesh is None else mesh
         if not isinstance(body, Mesh):
             raise ProblemError(
-                f"{what}: this run was read without its mesh: give measures(mesh=...), or make a "
+                f"{label}: this run was read without its mesh: give measures(mesh=...), or make a "
                 "History with mesh=."
                 if body is None
-                else f"{what}: mesh = {value_text(body)}: give a Mesh."
+                else f"{label}: mesh = {value_text(body)}: give a Mesh."
             )
         return body
 
@@ -401,10 +401,10 @@ class History:
             tables["history"] = with_measures(rows, step_measures, mesh)
             tables["measures"], tables["ends"] = measures_tables(step_measures, mesh)
         texts = {folder / f"{name}.csv": _csv_text(part) for name, part in tables.items()}
-        what = "the history cannot be written as a whole to"
-        with system_errors(what, folder, error=ProblemError):
+        label = "the history cannot be written as a whole to"
+        with system_errors(label, folder, error=ProblemError):
             folder.mkdir(parents=True, exist_ok=True)
-            write_texts(texts, what, error=ProblemError)
+            write_texts(texts, label, error=ProblemError)
             write_series(self.steps, folder)
 
 

@@ -84,7 +84,7 @@ class SpectrumBlock:
             levels, K = levels[rows], K[rows]
         return LevelTable(levels, K, is_smooth=len(levels) > 2)
 
-    def check(self, step: Step, what: str) -> None:
+    def check(self, step: Step, label: str) -> None:
         """Refuse a spectrum that is not that of a step.
 
         Raises
@@ -105,13 +105,13 @@ class SpectrumBlock:
             )
         if not has_levels:
             raise ProblemError(
-                f"{what}: spectrum is another one than that of step {step.index}, whose load "
+                f"{label}: spectrum is another one than that of step {step.index}, whose load "
                 f"states are {list(step.levels) or len(step.sif)}: give that of the run."
             )
 
 
 def block_of_run(
-    what: str,
+    label: str,
     spectrum: Any,
     criterion: Any,
     nu: Any,
@@ -121,7 +121,7 @@ def block_of_run(
 
     Parameters
     ----------
-    what : str
+    label : str
         Name of the function, for messages.
     spectrum, criterion, nu, threshold
         As of `SpectrumBlock`, or None.
@@ -131,20 +131,20 @@ def block_of_run(
     ProblemError
         Some of them without the others, or of another type.
     """
-    least_range = number(threshold, f"{what}: threshold", least=0)
+    least_range = number(threshold, f"{label}: threshold", least=0)
     if spectrum is None and criterion is None and nu is None:
         if least_range:
-            raise ProblemError(f"{what}: threshold belongs to a spectrum: give spectrum=... too.")
+            raise ProblemError(f"{label}: threshold belongs to a spectrum: give spectrum=... too.")
         return None
     if not isinstance(spectrum, Spectrum):
-        raise ProblemError(f"{what}: spectrum = {value_text(spectrum)}: give that of the run.")
+        raise ProblemError(f"{label}: spectrum = {value_text(spectrum)}: give that of the run.")
     if not callable(criterion):
         raise ProblemError(
-            f"{what}: criterion = {value_text(criterion)}: give that of the run; each cycle of the "
-            "spectrum is held against it again."
+            f"{label}: criterion = {value_text(criterion)}: give that of the run; each cycle of "
+            "the spectrum is held against it again."
         )
     return SpectrumBlock(
-        spectrum, criterion, number(nu, f"{what}: nu", above=-1, below=0.5), least_range
+        spectrum, criterion, number(nu, f"{label}: nu", above=-1, below=0.5), least_range
     )
 
 
@@ -417,7 +417,7 @@ def _factors(program: LoadProgram, rows: DrivingForce) -> Floats:
     return np.broadcast_to(values, a.size).reshape(a.shape)
 
 
-def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) -> None:
+def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, label: str) -> None:
     """Refuse a run whose K is not in proportion to its loads.
 
     Raises
@@ -430,7 +430,7 @@ def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) ->
         steady_loads = [load.name for load in problem.loads if load.is_steady]
         if steady_loads or any(problem.frictions):
             raise ProblemError(
-                f"{what}: {steady_loads[0] if steady_loads else 'friction'} does not scale with "
+                f"{label}: {steady_loads[0] if steady_loads else 'friction'} does not scale with "
                 "the loads, so K is not in proportion to them: grow the cracks under loads of "
                 "that size."
             )
@@ -439,7 +439,7 @@ def check_in_proportion(steps: Sequence[Step], rows: DrivingForce, what: str) ->
         R.shape[2] == 1 and np.ptp(R) > _SAME_RATIO
     ):
         raise ProblemError(
-            f"{what}: R goes from {R.min():.4g} to {R.max():.4g} along the run: K is not in "
+            f"{label}: R goes from {R.min():.4g} to {R.max():.4g} along the run: K is not in "
             "proportion to the loads. Steady loads, initial stress or contact that begins on the "
             "way do that: grow the cracks under loads of that size."
         )
@@ -517,7 +517,7 @@ def recompute_rates(
 
 
 def check_block(
-    steps: Sequence[Step], block: SpectrumBlock | None, law: Law | None, what: str
+    steps: Sequence[Step], block: SpectrumBlock | None, law: Law | None, label: str
 ) -> None:
     """Refuse steps of a spectrum without it, with another one, or with a law that it cannot serve.
 
@@ -528,16 +528,16 @@ def check_block(
     if block is None:
         if any(step.levels for step in steps):
             raise ProblemError(
-                f"{what}: the run has a spectrum, of whose cycles the steps have the largest only: "
-                "give spectrum=..., criterion=... and nu=... as the run had them."
+                f"{label}: the run has a spectrum, of whose cycles the steps have the largest "
+                "only: give spectrum=..., criterion=... and nu=... as the run had them."
             )
         return
     for step in steps:
-        block.check(step, what)
+        block.check(step, label)
     if getattr(law, "ratio", None) == "nominal":
         raise ProblemError(
-            f'{what}: the law has ratio="nominal", but the steps of a spectrum have K with contact '
-            "alone: run the spectrum with the law."
+            f'{label}: the law has ratio="nominal", but the steps of a spectrum have K with '
+            "contact alone: run the spectrum with the law."
         )
 
 

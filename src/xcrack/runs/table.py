@@ -383,7 +383,7 @@ def measures_tables(indicators: Indicators, mesh: Mesh) -> tuple[NDArray[Any], N
     names = _set_names(indicators)
     columns = [("step", np.int64), ("N", float), ("crack", np.int64)]
     columns += [(name, float) for name in ("area", "front_length", "depth")]
-    columns += [(f"{what}_{name}", float) for name in names for what in ("length", "depth")]
+    columns += [(f"{label}_{name}", float) for name in names for label in ("length", "depth")]
     rows = [
         (step.index, step.cycles, c, m.area, m.front_length, m.depth, *_by_set(m, names))
         for step, c, m in indicators
@@ -418,7 +418,7 @@ def with_measures(rows: NDArray[Any], indicators: Indicators, mesh: Mesh) -> NDA
     names, axes = _set_names(indicators), "xyz"[: mesh.dim]
     width = max((len(name) for name in mesh.facet_sets), default=1)
     columns: list[tuple[str, Any]] = [("area", float), ("depth", float)]
-    columns += [(f"{what}_{name}", float) for name in names for what in ("length", "depth")]
+    columns += [(f"{label}_{name}", float) for name in names for label in ("length", "depth")]
     for k in range(2):
         columns += [(f"end_{k}_{axis}", float) for axis in axes]
         columns.append((f"end_{k}_set", f"U{width}"))

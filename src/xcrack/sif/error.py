@@ -340,7 +340,7 @@ def _least_at_tip(solution: Solution, crack: int, domain: Domain) -> tuple[float
     """Largest cell at a tip for which bars hold, the cell there, and why it is too large."""
     least_cells = _SHORTEST[len(solution.space.tips_of(crack))]
     length, size = float(solution.lips[crack].weight.sum()), domain.size
-    what = {
+    label = {
         length / least_cells: f"the crack is {length / size:.1f} cells long, and bars hold from "
         f"{least_cells:g} on: refine the mesh there",
         domain.interface / BESIDE: f"another material begins {domain.interface / size:.2g} cells "
@@ -349,9 +349,9 @@ def _least_at_tip(solution: Solution, crack: int, domain: Domain) -> tuple[float
         f"away, and bars hold from {_ROOM:g} on: refine the mesh there",
     }
     return (
-        min(what),
+        min(label),
         size,
-        next((text for length_needed, text in what.items() if length_needed < size), ""),
+        next((text for length_needed, text in label.items() if length_needed < size), ""),
     )
 
 

@@ -82,10 +82,10 @@ def _sizes(width: float, size: float | None, size_near: float | None) -> dict[st
     }
 
 
-def _check_crack(a: float, limit: float, what: str) -> None:
+def _check_crack(a: float, limit: float, label: str) -> None:
     if not a < limit:
         raise GeometryError(
-            f"{what}: a = {a:g}: the crack leaves no ligament: give less than {limit:g}."
+            f"{label}: a = {a:g}: the crack leaves no ligament: give less than {limit:g}."
         )
 
 

@@ -44,7 +44,7 @@ _DRAWABLE = 'a Solution, or a Problem with field="mesh"'
 _NO_OPENGL = "it cannot draw here (no OpenGL): apt-get install libegl1 libgl1-mesa-dri"
 
 
-def colour_map(value: Any, what: str, error: type[XcrackError]) -> Any:
+def colour_map(value: Any, label: str, error: type[XcrackError]) -> Any:
     """A colour map of matplotlib, or its name, checked."""
     matplotlib = require_package("matplotlib", "plot: cmap")
     if isinstance(value, str) and value in matplotlib.colormaps:
@@ -52,7 +52,7 @@ def colour_map(value: Any, what: str, error: type[XcrackError]) -> Any:
     if isinstance(value, require_package("matplotlib.colors", "plot: cmap").Colormap):
         return value
     raise error(
-        f"{what} = {value_text(value)}: give the name of a colour map of matplotlib, such as "
+        f"{label} = {value_text(value)}: give the name of a colour map of matplotlib, such as "
         '"RdBu".'
     )
 

@@ -45,7 +45,7 @@ class Projection:
 
 
 def given_plane(
-    value: Any, what: str = "plane", error: type[XcrackError] = ProblemError
+    value: Any, label: str = "plane", error: type[XcrackError] = ProblemError
 ) -> Projection:
     """A plane by a point and two directions, checked.
 
@@ -68,8 +68,8 @@ def given_plane(
     except ProblemError as cause:
         reason = str(cause)[:-1]
     raise error(
-        f"{what} = {value_text(value)}: give a point and two directions, ((x, y, z), (right, up)); "
-        f"{reason}."
+        f"{label} = {value_text(value)}: give a point and two directions, ((x, y, z), (right, up))"
+        f"; {reason}."
     )
 
 

@@ -182,8 +182,8 @@ def _notes(source: Source) -> list[str]:
             all_R = np.concatenate([R.ravel() for R in ratios])
             all_R = all_R[np.isfinite(all_R)]
             if len(all_R):
-                what = "run" if history.unit == "cycle" else f"cycles of each {history.unit}"
-                notes.append(f"R of the {what} is {all_R.min():.3g} to {all_R.max():.3g}: compare "
+                label = "run" if history.unit == "cycle" else f"cycles of each {history.unit}"
+                notes.append(f"R of the {label} is {all_R.min():.3g} to {all_R.max():.3g}: compare "
                              "it with the range that the growth law was fitted for.")  # fmt: skip
         program = history.settings.get("load_program", "None")
         if program != "None":

@@ -239,9 +239,9 @@ def setting_words(text: str) -> str:
     return _DIGITS.sub(lambda m: f"{float(m[0]):.6g}", _ARRAY.sub(r"\1 numbers, \2", text))
 
 
-def path_or_result(value: Any, what: str, error: type[XcrackError]) -> Any:
+def path_or_result(value: Any, label: str, error: type[XcrackError]) -> Any:
     """The folder of a run as a path; anything else as it is."""
-    return path_of(value, what, error=error) if isinstance(value, str | PathLike) else value
+    return path_of(value, label, error=error) if isinstance(value, str | PathLike) else value
 
 
 def source_of(

@@ -121,7 +121,7 @@ class SpaceScene:
         return np.concatenate([part.reshape(-1, 3) for part in parts])
 
 
-def clip_plane(value: Any, what: str = "clip", error: type[XcrackError] = ProblemError) -> Plane:
+def clip_plane(value: Any, label: str = "clip", error: type[XcrackError] = ProblemError) -> Plane:
     """Point and unit normal of a plane, checked."""
     try:
         point, normal = value
@@ -135,7 +135,7 @@ def clip_plane(value: Any, what: str = "clip", error: type[XcrackError] = Proble
     except ProblemError as cause:
         reason = str(cause)[:-1]
     raise error(
-        f"{what} = {value_text(value)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); "
+        f"{label} = {value_text(value)}: give a point and a normal, ((x, y, z), (nx, ny, nz)); "
         f"what lies on the side of the normal is left out. Here {reason}."
     )
 

@@ -81,11 +81,11 @@ def _case(result: Result) -> Markup:
     head = Markup(
         f'<h3 id="{escape_html(case.id)}">{element("span", mark, cls=kind)} {case.id}</h3>'
     )
-    what = (
+    label = (
         f"{REQUIREMENTS[case.requirement]} · {case.modelling} · {case.kind}: {case.reference} · "
         f"{result.seconds:.1f} s"
     )
-    parts: list[Any] = [head, element("p", what)]
+    parts: list[Any] = [head, element("p", label)]
     if result.skipped or result.error:
         parts.append(element("pre", result.skipped or result.error))
     rows = [

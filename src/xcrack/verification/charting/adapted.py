@@ -35,16 +35,16 @@ class ToleranceRun:
     failed: str = ""
 
 
-def chart_tolerances(value: Any, what: str, error: type[XcrackError]) -> tuple[float, ...]:
+def chart_tolerances(value: Any, label: str, error: type[XcrackError]) -> tuple[float, ...]:
     """Tolerances of `adapt`, checked, from large to small."""
     arguments = {
-        number(one, f"{what}[{k}]", above=0, below=1, error=error)
-        for k, one in enumerate(entries(value, what, error=error))
+        number(one, f"{label}[{k}]", above=0, below=1, error=error)
+        for k, one in enumerate(entries(value, label, error=error))
     }
     if not arguments:
-        raise error(f"{what} is empty: give numbers between 0 and 1, or leave it out.")
+        raise error(f"{label} is empty: give numbers between 0 and 1, or leave it out.")
     if min(arguments) < _STRONGEST:
-        raise error(f"{what}: {min(arguments):g} is too small: give {_STRONGEST:g} or more.")
+        raise error(f"{label}: {min(arguments):g} is too small: give {_STRONGEST:g} or more.")
     return tuple(sorted(arguments, reverse=True))
 
 

@@ -355,9 +355,9 @@ def _compared(
     }
     assert places is not None
     adapted = [row_of(run, places, values[best], scale) for run in others]
-    what = "quantity" if runs.quantity is not None else "K" if runs.has_tips else "strain energy"
+    label = "quantity" if runs.quantity is not None else "K" if runs.has_tips else "strain energy"
     every_row = (*rows.values(), *adapted)
-    return Chart(every_row, rows[best], max(remainder / scale, 1e-15), what, wanted, repeat)
+    return Chart(every_row, rows[best], max(remainder / scale, 1e-15), label, wanted, repeat)
 
 
 def _places(outcomes: dict[tuple[int, int], tuple[_Outcome, float]]) -> Sampled | None:

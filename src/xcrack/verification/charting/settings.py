@@ -50,14 +50,14 @@ Named = dict[str, dict[str, Any]]
 
 
 def named_settings(
-    settings: Any, what: str = "settings", error: type[XcrackError] = ProblemError
+    settings: Any, label: str = "settings", error: type[XcrackError] = ProblemError
 ) -> Named:
     """Settings by name, checked; those of the problem are always among them.
 
     Parameters
     ----------
     settings : sequence of mappings, or mapping of name to mapping
-    what : str
+    label : str
         Its name in a message.
     error : type of XcrackError
 
@@ -70,13 +70,13 @@ def named_settings(
         pairs = [(str(name), changes) for name, changes in settings.items()]
     else:
         try:
-            entries_of_list = entries(settings, what, error=error)
+            entries_of_list = entries(settings, label, error=error)
         except error as cause:
             example = '[{"order": 1}, {"radius": 0.2}]'
             raise error(f"{str(cause)[:-1]} of dicts, such as {example}.") from None
-        pairs = [(_name(changes, what, error), changes) for changes in entries_of_list]
+        pairs = [(_name(changes, label, error), changes) for changes in entries_of_list]
     if not pairs:
-        raise error(f"{what} is empty: give at least one dict of fields, or leave it out.")
+        raise error(f"{label} is empty: give at least one dict of fields, or leave it out.")
     settings_by_name: Named = {}
     if not any(not changes for _, changes in pairs):
         settings_by_name[_AS_GIVEN] = {}
@@ -85,19 +85,20 @@ def named_settings(
             if not isinstance(field, str) or field not in (*IN_PROBLEM, *_METHOD):
                 known_fields = ", ".join((*IN_PROBLEM, *_METHOD))
                 raise error(
-                    f"{what}: {value_text(field)} is no choice of method; give one of "
+                    f"{label}: {value_text(field)} is no choice of method; give one of "
                     f"{known_fields}. Meshes go into meshes=, loads into states=."
                 )
         if name in settings_by_name:
-            raise error(f"{what}: {value_text(name)} stands there twice; leave one out.")
+            raise error(f"{label}: {value_text(name)} stands there twice; leave one out.")
         settings_by_name[name] = dict(changes)
     return settings_by_name
 
 
-def _name(changes: Any, what: str, error: type[XcrackError]) -> str:
+def _name(changes: Any, label: str, error: type[XcrackError]) -> str:
     if not isinstance(changes, Mapping):
         raise error(
-            f'{what}: {value_text(changes)} is no dict of fields: give some such as {{"order": 1}}.'
+            f"{label}: {value_text(changes)} is no dict of fields: give some such as "
+            '{"order": 1}.'
         )
     return ", ".join(f"{field} {value}" for field, value in changes.items()) or _AS_GIVEN
 
