@@ -122,6 +122,17 @@ def test_stick_by_conjugate_gradients():
     assert np.abs(np.linalg.norm(contact.shear, axis=1) - TAU).max() <= 1e-6
 
 
+def test_rows_of_friction_are_condensed_by_a_factor():
+    """By default, as rows are many: the slip of a sheared penny is that of conjugate gradients."""
+    problem = pressed_penny(0.17, 0.3, numerics=xc.Numerics())[0]
+    solution, other = xc.solve(problem), xc.solve(replace(problem, numerics=CG))
+    assert "one factorisation" in str(solution.report)
+    assert "one factorisation" not in str(other.report)
+    first, second = solution.contact[0], other.contact[0]
+    assert np.abs(first.shear - second.shear).max() <= 1e-6
+    assert np.abs(first.slip - second.slip).max() <= 1e-6 * np.abs(first.slip).max()
+
+
 @pytest.mark.slow
 def test_a_path_of_shear():
     """Up to TAU and down to -TAU: K_II follows what friction cannot carry."""

@@ -23,6 +23,10 @@ from xcrack.model.problem import Problem, ProblemArgument
 
 # Unknowns of a 3D body above which a factorisation costs more, by order (measured).
 _DIRECT = {1: 4_000, 2: 8_000}
+# With friction conjugate gradients solve once for each row of pressure and shear: at 4 800 unknowns
+# of order 1 a factor takes a seventh of their time, at 17 000 of order 2 a seventeenth, and beyond
+# these unknowns more than 1.4 GB.
+_DIRECT_WITH_FRICTION = 50_000
 # Nodes that carry a jump lie within so many cells across a crack, by order.
 _LAYER = {1: 2.0, 2: 1.5}
 
@@ -108,7 +112,12 @@ def _memory(
         return factor * float(standard + enriched) ** power
     memory = float(np.dot(_OF_ROWS[problem.order or 1], (standard, enriched)))
     memory += _OF_STATE * (n_states - 1) * (standard + enriched)
-    return memory * (_RUBBING if problem.contact != "off" and any(problem.frictions) else 1.0)
+    return memory * (_RUBBING if _may_rub(problem) else 1.0)
+
+
+def _may_rub(problem: Problem) -> bool:
+    """Whether crack faces have friction."""
+    return problem.contact != "off" and any(problem.frictions)
 
 
 def check_memory(problem: Problem, n_states: int = 1) -> None:
@@ -153,7 +162,8 @@ def takes_iterations(problem: Problem, n: int) -> bool:
     linear_solver = problem.numerics.linear
     if linear_solver != "auto":
         return linear_solver == "iterative"
-    is_large = problem.mesh.dim == 3 and n > _DIRECT[problem.order or 1]
+    most = _DIRECT_WITH_FRICTION if _may_rub(problem) else _DIRECT[problem.order or 1]
+    is_large = problem.mesh.dim == 3 and n > most
     if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
         return False  # quadratic functions of both cracks nearly vanish together beside a junction
     return is_large and problem.numerics.contact_method is None  # others change the matrix

@@ -117,8 +117,9 @@ class Numerics(Declared):
         In 3D: distance along a front from a free surface at which K is read that has no limit
         there. None: 2 % of the front's length.
     linear : {"auto", "direct", "iterative"}
-        Linear solver. Auto: a factorisation in 2D and below 4 000 unknowns (8 000 at order
-        2), above that in 3D conjugate gradients with a multigrid hierarchy: a factor of a 3D body
+        Linear solver. Auto: a factorisation in 2D and below 4 000 unknowns (8 000 at order 2, at
+        either order 50 000 with friction, which takes a solve for each row of pressure and shear),
+        above that in 3D conjugate gradients with a multigrid hierarchy: a factor of a 3D body
         fills, and its time grows with the square of the unknowns. Iterative does without
         `orthonormal` and `patch`: it has its own basis, orthonormal node by node, at order 2 star
         by star.
