@@ -299,3 +299,9 @@ def test_a_front_that_pressures_close_against_its_integrals_warns(n, warned):
     assert sif.closed.all() == warned
     assert any("faces press there" in str(w.message) for w in caught) == warned
     assert warned or (0.03 < inside.min() and inside.max() < 0.11)
+
+
+def test_little_K_of_a_closed_crack_warns():
+    """It is .4 % of K of the mean stress, and 6.8 % off."""
+    messages = drawn_cracks.K_of(drawn_cracks.plane(7665).problem)[1]
+    assert any("by its estimate" in text for text in messages)

@@ -27,7 +27,7 @@ _ZONE = 2.0  # cells; in shorter contact zones the pressure is hardly more than 
 # Share of the largest K of a crack that its estimated error and bar may have without a warning: of
 # drawn scenes that are off by more than 5 % nearly all are beyond it, of the others one in twelve.
 _OFF = 0.03
-_NOTHING = 0.01  # share of K of the mean stress of the body below which K of a crack is nothing
+_NOTHING = 0.005  # share of K of the mean stress of the body below which K of a crack is nothing
 
 
 @dataclass(frozen=True, eq=False)
