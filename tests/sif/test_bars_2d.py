@@ -114,9 +114,9 @@ def test_pressure_that_changes_between_points(exponent):
     assert np.abs(sif.best - wanted).max() < 0.3 * np.abs(sif.K - wanted).max()
 
 
-# Little room, tips that are near, faces that overlap, tees where some or all faces press: their
-# errors were 3, 3.4, 14, 2.4 and 1.8 bars once.
-MISSED = (2725, *mission(4295, 4665, 5330, 6440))
+# Little room, a cross that rubs, tips that are near, faces that overlap, tees where some or all
+# faces press, an arc that rubs: their errors were 3, 7.3, 3.4, 14, 2.4, 1.8 and 3.2 bars once.
+MISSED = (2725, 860, *mission(4295, 4665, 5330, 6440, 1415))
 
 
 @pytest.mark.parametrize("seed", MISSED)
@@ -125,7 +125,7 @@ def test_bars_of_drawn_scenes_that_missed(seed):
 
     With little room, too few points of the domain were the error; where faces of a crack that is
     open overlap between pressures, no bar knew it; at tees where faces press the estimate has no
-    sign.
+    sign; with friction none knew where faces begin to stick, slip and open.
     """
     scene = drawn_cracks.plane(seed)
     sifs = [with_error(scene.problem, c) for c in range(len(scene.problem.cracks))]

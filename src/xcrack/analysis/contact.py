@@ -7,7 +7,13 @@ from typing import Any, cast
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.analysis.friction import FrictionSolution, FrictionWork, has_friction, solve_friction
+from xcrack.analysis.friction import (
+    FrictionSolution,
+    FrictionWork,
+    RubbingStates,
+    has_friction,
+    solve_friction,
+)
 from xcrack.analysis.multipliers import Multipliers, gap_rows, multipliers
 from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.fem.system import System
@@ -79,6 +85,8 @@ class ContactSolution:
         Of the cracks whose faces rub.
     dissipated : tuple of float
         Energy that friction took in each state since the one before; empty without.
+    rubbing : RubbingStates or None
+        In 2D with friction.
     """
 
     u: Floats
@@ -89,6 +97,7 @@ class ContactSolution:
     dual: Floats | None = None
     friction_work: tuple[FrictionWork, ...] = ()
     dissipated: tuple[float, ...] = ()
+    rubbing: RubbingStates | None = None
 
     def closed_sets(self) -> SolverState:
         """Closed sets by place, for the next solve."""
@@ -192,6 +201,7 @@ def solve_contact(
             sets,
             friction_work=tuple(friction_solution.work),
             dissipated=friction_solution.dissipated,
+            rubbing=friction_solution.rubbing,
         )
     for c in expected_cracks:
         closed_groups = closed_sets[c]

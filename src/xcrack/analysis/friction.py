@@ -6,7 +6,7 @@ or from what an earlier crack state left behind.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -188,6 +188,9 @@ class SlipPoint:
         Tractions of all substeps, and where they lie between the state before (0) and this one (1).
     at_rest : bool
         Nothing has acted so far.
+    change : (g + r,) array
+        Weak gaps of the load without tractions, and slips since the substep before: of these follow
+        `lam` and `status`. Empty at rest.
     """
 
     d: Floats
@@ -198,6 +201,7 @@ class SlipPoint:
     sets: int = 0
     tractions_between: tuple[tuple[float, Floats], ...] = ()
     at_rest: bool = False
+    change: Floats = field(default_factory=lambda: np.zeros(0))
 
 
 def at_rest(rows: FrictionRows, status: Status) -> SlipPoint:
@@ -287,18 +291,24 @@ def _next_point(rows: FrictionRows, load: Floats, begin: SlipPoint, substeps: in
         work += _friction_work(rows, place, state)
         gap = state.gap.copy()
         gap[rows.n :] += place.gap[rows.n :]
-        place = SlipPoint(d, state.lam, gap, state.status)
+        place = SlipPoint(d, state.lam, gap, state.status, change=_change_since(rows, d, place))
         tractions_between.append((end, state.lam))
         t, step = end, min(2 * step, longest_step)
     return SlipPoint(
-        place.d, place.lam, place.gap, place.status, work, sets, tuple(tractions_between)
-    )
+        place.d, place.lam, place.gap, place.status, work, sets, tuple(tractions_between),
+        change=place.change,
+    )  # fmt: skip
 
 
 def _friction_solution(rows: FrictionRows, d: Floats, place: SlipPoint) -> FrictionState:
+    return _tractions(rows, _change_since(rows, d, place), place.status)
+
+
+def _change_since(rows: FrictionRows, d: Floats, place: SlipPoint) -> Floats:
+    """Weak gaps without tractions, and slips since a place."""
     change = d.copy()
     change[rows.n :] -= place.gap[rows.n :]
-    return _tractions(rows, change, place.status)
+    return change
 
 
 def _tractions(rows: FrictionRows, d: Floats, status: Status) -> FrictionState:
@@ -343,6 +353,26 @@ def _friction_work(rows: FrictionRows, start_place: SlipPoint, state: FrictionSt
 
 
 @dataclass(frozen=True, eq=False)
+class RubbingStates:
+    """What the tractions of all states follow from, in 2D: `of_status(rows, change, status)`.
+
+    Attributes
+    ----------
+    N : sparse matrix (g + r, n_dof)
+        Weak gaps, and weak slips.
+    rows : FrictionRows
+    change : (states, g + r) array
+        As of `SlipPoint`.
+    status : tuple of Status
+    """
+
+    N: sp.csr_matrix
+    rows: FrictionRows
+    change: Floats
+    status: tuple[Status, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class FrictionSolution:
     """Contact with friction in all load states.
 
@@ -355,12 +385,15 @@ class FrictionSolution:
         Energy since the state before.
     motion_between : (n_dof, k) array, length
         Displacements of the substeps; none where nobody asked.
+    rubbing : RubbingStates or None
+        None in 3D, and for an alternative to multipliers.
     """
 
     states: list[StateContact]
     work: list[FrictionWork]
     dissipated: tuple[float, ...]
     motion_between: Floats
+    rubbing: RubbingStates | None = None
 
 
 def has_friction(problem: Problem, c: int) -> bool:
@@ -510,7 +543,17 @@ def solve_friction(
         _substep_displacements(engine, N, f, u_imposed, places)
         if with_substeps
         else np.zeros((len(f), 0)),
+        _rubbing_states(N, rows, places),
     )
+
+
+def _rubbing_states(
+    N: sp.csr_matrix, rows: FrictionRows, places: Sequence[SlipPoint]
+) -> RubbingStates | None:
+    if rows.tangents != 1 or rows.compliance is not None:
+        return None
+    change = np.stack([place.change for place in places])
+    return RubbingStates(N, rows, lock(change), tuple(place.status for place in places))
 
 
 @dataclass(frozen=True, eq=False)
@@ -582,6 +625,7 @@ def _substep_displacements(
 
 __all__ = [
     "FrictionSolution",
+    "RubbingStates",
     "SlipPoint",
     "at_rest",
     "has_friction",

@@ -19,6 +19,7 @@ from xcrack.fem.assembly import Tabulated
 from xcrack.fem.facets import LipPoints, arc_position
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.linalg.active_set import of_set
+from xcrack.linalg.coulomb import Status, of_status
 from xcrack.linalg.rigid_motion import without_motion
 
 # Functionals that are affine in a solution: a sum over points, and pressures on crack faces.
@@ -62,7 +63,7 @@ class GoalCells:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """m functionals J = f . u + g . p + a constant of the loads.
+    """m functionals J = f . u + g . p + h . t + a constant of the loads, with shear t.
 
     Attributes
     ----------
@@ -74,7 +75,7 @@ class Goal:
     m : int
         Number of functionals.
     on_faces : callable
-        Makes `pressure`, which few estimates need.
+        Makes factors of pressures and shear, which few estimates need.
     """
 
     parts: tuple[GoalPoints, ...]
@@ -87,7 +88,12 @@ class Goal:
     @cached_property
     def pressure(self) -> Floats:
         """Factors of pressures on the faces of that crack, at their integration points `(q, m)`."""
-        return self.on_faces()
+        return np.asarray(self.on_faces()[0])
+
+    @cached_property
+    def shear(self) -> Floats:
+        """Factors of shear on lip +, along the tangents of friction `(q, m)`."""
+        return np.asarray(self.on_faces()[1])
 
     def on_functions(self, space: FunctionSpace) -> Floats:
         """The part f: each functional of each function and component `(n_dof, m)`."""
@@ -110,10 +116,15 @@ class Goal:
         """The part g: each functional of each pressure function `(g, m)`, from its values."""
         return np.asarray(values.T @ self.pressure)
 
-    def of(self, solution: Solution, pressure: Floats) -> Floats:
-        """Value f . u + g . p, with pressures at the points of the faces `(m,)`."""
+    def on_shears(self, values: Floats) -> Floats:
+        """The part h: each functional of the shear of each function `(g, m)`, from its values."""
+        return np.asarray(values.T @ self.shear)
+
+    def of(self, solution: Solution, pressure: Floats, shear: Floats | None = None) -> Floats:
+        """Value f . u + g . p + h . t, with tractions at the points of the faces `(m,)`."""
         f = self.on_functions(solution.space)
-        return np.asarray(solution.u @ f + pressure @ self.pressure)
+        value = solution.u @ f + pressure @ self.pressure
+        return np.asarray(value if shear is None else value + shear @ self.shear)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,15 +164,12 @@ def groups_of(factored: FactoredSolution) -> GoalGroups | None:
         contact.spaces, contact.pressure, contact.active, strict=True
     ):
         if m is not None and pressure is not None and is_active is not None:
-            lips = model.lips[m.crack]
-            position = (m.values.T @ (lips.weight * lips.s)) / m.measure
-            number = np.full(len(m.measure), m.crack)
-            rows = gap_rows(m, lips, model.jumps[m.crack])
-            piece = np.searchsorted(_breaks(model.space, m.crack, lips), position)
-            parts.append((rows, is_active, pressure, number, position, piece))
+            rows = gap_rows(m, model.lips[m.crack], model.jumps[m.crack])
+            parts.append((rows, is_active, pressure))
     if not parts or contact.dual is None:
         return None
-    all_rows, is_closed, pressures, crack, position, piece = zip(*parts, strict=True)
+    all_rows, is_closed, pressures = zip(*parts, strict=True)
+    crack, position, piece = zip(*_places(factored), strict=True)
     return GoalGroups(
         sp.csr_matrix(sp.vstack(all_rows)),
         contact.dual,
@@ -171,6 +179,18 @@ def groups_of(factored: FactoredSolution) -> GoalGroups | None:
         np.concatenate(position),
         np.concatenate(piece),
     )
+
+
+def _places(factored: FactoredSolution) -> list[tuple[Ints, Floats, Ints]]:
+    """Crack, position and piece of the groups of each crack that has some; see `GoalGroups`."""
+    model, result = factored.model, []
+    for m in factored.contact.spaces:
+        if m is not None:
+            lips = model.lips[m.crack]
+            position = (m.values.T @ (lips.weight * lips.s)) / m.measure
+            piece = np.searchsorted(_breaks(model.space, m.crack, lips), position)
+            result.append((np.full(len(m.measure), m.crack), position, piece))
+    return result
 
 
 def _breaks(space: FunctionSpace, c: int, lips: LipPoints) -> Floats:
@@ -225,7 +245,7 @@ def duals(
         states = factored.contact.u.shape[1]
         nothing = np.zeros((0, f.shape[1]))
         return DualSolutions(z, np.zeros(states, dtype=np.int64), nothing[None], nothing)
-    per_pressure = groups.N @ z0 + _on_groups(factored, groups, goals)
+    per_pressure = groups.N @ z0 + _on_groups(factored, groups.crack, goals, Goal.on_pressures)
     sets, set_number = np.unique(groups.active, axis=0, return_inverse=True)
     zs, mus = [], []
     for is_active in sets:
@@ -239,14 +259,19 @@ def duals(
     return DualSolutions(np.stack(zs), set_number.ravel(), np.stack(mus), per_pressure)
 
 
-def _on_groups(factored: FactoredSolution, groups: GoalGroups, goals: Sequence[Goal]) -> Floats:
-    """g_J of the goals `(g, m)`."""
+def _on_groups(
+    factored: FactoredSolution,
+    crack: Ints,
+    goals: Sequence[Goal],
+    on_functions: Callable[[Goal, Floats], Floats],
+) -> Floats:
+    """Tractions of groups, of which the cracks are given, in the goals `(g, m)`."""
     columns = []
     for goal in goals:
-        part = np.zeros((len(groups.crack), goal.m))
+        part = np.zeros((len(crack), goal.m))
         space = factored.contact.spaces[goal.crack]
         if space is not None:
-            part[groups.crack == goal.crack] = goal.on_pressures(space.values)
+            part[crack == goal.crack] = on_functions(goal, space.values)
         columns.append(part)
     return np.concatenate(columns, axis=1)
 
@@ -288,6 +313,57 @@ def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -
             changes.append(np.abs(duals.per_pressure.T @ pressure_change))
         change_sum = changes[0] + changes[1]
         total += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)
+    return total
+
+
+# With friction a function may stick, slip either way, or be open.
+
+
+def rubbing_end_changes(
+    factored: FactoredSolution, goals: Sequence[Goal], states: Sequence[int]
+) -> Floats:
+    """As `end_changes`, of the ends of zones that stick, slip and are open `(states, m)`.
+
+    Of two neighbours one takes the status of the other, and then the other that of the one.
+
+    Parameters
+    ----------
+    factored : FactoredSolution
+        With friction, of multipliers.
+    goals : sequence of Goal
+        Their functionals one after the other in m.
+    states : sequence of int
+    """
+    rubbing, motion = factored.contact.rubbing, factored.motion
+    total = np.zeros((len(states), sum(goal.m for goal in goals)))
+    if rubbing is None:
+        return total
+    f = np.concatenate([goal.on_functions(factored.model.space) for goal in goals], axis=1)
+    z = factored.engine.solve(f - motion.modes @ (motion.modes.T @ f))
+    crack, position, piece = (np.concatenate(part) for part in zip(*_places(factored), strict=True))
+    rows = rubbing.rows
+    of_pressure = _on_groups(factored, crack, goals, Goal.on_pressures)
+    of_shear = _on_groups(factored, crack, goals, Goal.on_shears)[rows.rubbing_rows]
+    per_traction = rubbing.N @ z + np.concatenate([of_pressure, of_shear])
+    order = np.lexsort((position, crack))
+    same_piece = (np.diff(crack[order]) == 0) & (np.diff(piece[order]) == 0)
+    for row, k in enumerate(states):
+        slip = np.zeros(rows.n, dtype=np.int64)
+        slip[rows.rubbing_rows] = rubbing.status[k].slip
+        is_closed = rubbing.status[k].is_closed
+        status = np.where(is_closed, slip, 2)
+        tractions = of_status(rows, rubbing.change[k], rubbing.status[k])[0]
+        ends = np.nonzero((np.diff(status[order]) != 0) & same_piece)[0]
+        for pair in (order[end : end + 2] for end in ends):
+            changes = []
+            for group, neighbour in (pair, pair[::-1]):
+                closed_then, slip_then = is_closed.copy(), slip.copy()
+                closed_then[group], slip_then[group] = is_closed[neighbour], slip[neighbour]
+                status_then = Status(closed_then, slip_then[rows.rubbing_rows])
+                tractions_then = of_status(rows, rubbing.change[k], status_then)[0]
+                changes.append(np.abs(per_traction.T @ (tractions_then - tractions)))
+            change_sum = changes[0] + changes[1]
+            total[row] += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)
     return total
 
 

@@ -17,9 +17,11 @@ from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Bools, Floats
 from xcrack.base.errors import XcrackError, XcrackWarning
+from xcrack.estimate.dual import rubbing_end_changes
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.refinement import growing_sizes, refine
 from xcrack.sif.domain_2d import domain_of, intensity_at_tip
+from xcrack.sif.goal_2d import tip_goal
 from xcrack.sif.sif import SIF, KErrors, bars_of, joined_sif
 
 _GROWS = 0.3  # by which cells grow with the distance from where they are smallest
@@ -28,8 +30,9 @@ _HALF = 0.5  # of a cell, where nothing is estimated
 # has a bar of its own; of the largest change of a crack, least half-width where it has none.
 _ADDED, _LEAST = 0.002, 0.75
 # With friction the root of the sum of squares of parts of the largest change of a crack, the spread
-# of both modes in the second solution, and its largest K times (cell / length of the crack)^1.5.
-_RUBBED_CHANGE, _RUBBED_SPREAD, _RUBBED_CELLS = 0.03, 1.8, 0.03
+# of both modes in the second solution, its largest K times (cell / length of the crack)^1.5, and
+# what the ends of zones that stick, slip and are open change by a group.
+_RUBBED_CHANGE, _RUBBED_SPREAD, _RUBBED_CELLS, _RUBBED_ENDS = 0.03, 1.8, 0.02, 0.5
 # Reasons that smaller cells do not take away, and that the change of K does not show.
 _STAYS = (
     "order 1", "contact by", "the faces press at the kink",
@@ -120,12 +123,34 @@ def bars_by_finer_cells(
         joined_sif([states[k] for states in by_tip], 2) for k in range(len(finer_solutions_))
     ]
     of_second = estimate(finer_solutions_, second_sifs, crack)
-    cells = None
+    cells, ends = None, np.zeros((len(sifs), len(tips), 2))
     if finer_solutions_[0].has_friction:
         length = float(finer_solutions_[0].lips[crack].weight.sum())
         cells = np.array([domain_of(finer_solutions_[0], t).size for t in tips]) / length
-    state_rows = zip(sifs, second_sifs, of_second, strict=True)
+        ends = rubbing_ends(finer_solutions_, crack)
+    state_rows = zip(sifs, second_sifs, of_second, ends, strict=True)
     return [_from_second(*row, cells) for row in state_rows]
+
+
+def rubbing_ends(solutions: Sequence[Solution], crack: int) -> Floats:
+    """Change of K where a zone that sticks, slips or is open ends a function later or earlier.
+
+    Parameters
+    ----------
+    solutions : sequence of Solution
+        With friction, in 2D, of one solve that kept its factor.
+    crack : int
+
+    Returns
+    -------
+    (states, tips, 2) array, stress · √length
+    """
+    factored, tips = solutions[0].factored, solutions[0].space.tips_of(crack)
+    shape = (len(solutions), len(tips), 2)
+    if factored is None or not tips:
+        return np.zeros(shape)
+    goals = [tip_goal(solutions[0], t) for t in tips]
+    return rubbing_end_changes(factored, goals, [s.number for s in solutions]).reshape(shape)
 
 
 def _half_widths_of_change(change: Floats) -> Floats:
@@ -134,20 +159,25 @@ def _half_widths_of_change(change: Floats) -> Floats:
     return np.asarray(np.maximum(np.abs(change), _LEAST * change_size.max(initial=0.0)))
 
 
-def _half_widths_of_friction(second_sif: SIF, change: Floats, cells: Floats) -> Floats:
-    """What the change, the spread and the cells of the second solution leave; cells per length."""
+def _half_widths_of_friction(
+    second_sif: SIF, change: Floats, ends: Floats, cells: Floats
+) -> Floats:
+    """What the second solution leaves: its change, spread, ends of zones, and cells per length."""
     largest_K = np.abs(second_sif.K).max(initial=0.0)
     parts = [
         np.full(len(cells), _RUBBED_CHANGE * np.abs(change).max(initial=0.0)),
         _RUBBED_SPREAD * np.linalg.norm(second_sif.spread, axis=1),
+        _RUBBED_ENDS * np.linalg.norm(ends, axis=1),
         _RUBBED_CELLS * largest_K * cells**1.5,
     ]
     half = np.sqrt(np.sum(np.square(parts), axis=0))
     return np.asarray(np.repeat(half[:, None], change.shape[1], axis=1))
 
 
-def _from_second(sif: SIF, second_sif: SIF, of_second: KErrors, cells: Floats | None) -> KErrors:
-    """Bars of one state from the second solution; with friction by its cells per length."""
+def _from_second(
+    sif: SIF, second_sif: SIF, of_second: KErrors, ends: Floats, cells: Floats | None
+) -> KErrors:
+    """Bars of one state from the second solution; with friction by ends and cells per length."""
     reasons_that_stay = ["" if has_help(reason) else reason for reason in of_second.reasons]
     is_known: Bools = np.array([not reason for reason in of_second.reasons], dtype=bool)
     best_K = np.where(is_known[:, None], second_sif.K + of_second.eta, second_sif.K)
@@ -157,7 +187,7 @@ def _from_second(sif: SIF, second_sif: SIF, of_second: KErrors, cells: Floats | 
     half = (
         _half_widths_of_change(eta)
         if cells is None
-        else _half_widths_of_friction(second_sif, eta, cells)
+        else _half_widths_of_friction(second_sif, eta, ends, cells)
     )
     bar_of_second = np.hypot(of_second.bar, _ADDED * eta_size)
     bar = np.where(is_known[:, None], bar_of_second, half)

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from xcrack.analysis.friction import tangents
 from xcrack.analysis.solution import Solution, initial_stress_at
 from xcrack.base.arrays import Floats
 from xcrack.estimate.dual import Goal, GoalCells, GoalPoints
@@ -78,9 +79,9 @@ def tip_goal(solution: Solution, t: int) -> Goal:
     rotation = _rotation(solution, t, r_outer)
     faces = partial(_faces, solution, t, r_outer, r_inner)
     if _has_bent_faces(solution, t, r_outer):
-        on_crack, pressure, _ = faces()
+        on_crack, tractions, _ = faces()
         parts.extend(on_crack)
-        return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: pressure)
+        return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: tractions)
     return Goal(tuple(parts), tuple(plain_parts), rotation, tip.crack, 2, lambda: faces()[1])
 
 
@@ -128,18 +129,23 @@ def _has_bent_faces(solution: Solution, t: int, r_outer: float) -> bool:
 def _faces(
     solution: Solution, t: int, r_outer: float, r_inner: float
 ) -> tuple[Sequence[GoalPoints], Floats, Floats]:
-    """Gradients on bent faces, factors of pressures `(q, 2)` and of the stress at the tip."""
+    """Gradients on bent faces, factors of tractions `(2, q, 2)` and of the stress at the tip.
+
+    Tractions are pressures, and shear on lip + along `tangents`.
+    """
     space, tip_material = solution.space, material_at_tip(solution, t)
     tip = space.tips[t]
     lips, R, scale = solution.lips[tip.crack], tip.frame, 0.5 * tip_material.E_prime
-    pressure, per_stress = np.zeros((len(lips), 2)), np.zeros((2, 2, 2))
+    tractions, per_stress = np.zeros((2, len(lips), 2)), np.zeros((2, 2, 2))
+    pressure, shear = tractions
     way = lips.way_from(space.mesh, tip.x)
     near_points = np.nonzero(np.linalg.norm(way, axis=1) < r_outer)[0]
     if not len(near_points):
-        return (), pressure, per_stress
+        return (), tractions, per_stress
     xi = way[near_points] @ R.T
     xi[np.abs(xi[:, 1]) < _STRAIGHT * r_outer, 1] = 0.0
     is_bent = bool(xi[:, 1].any())
+    along = tangents(lips)[near_points, 0] @ R.T
     parts = []
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near_points, s], lips.bary[near_points, s]
@@ -151,6 +157,7 @@ def _faces(
         factor = np.zeros((len(near_points), 2, 2, 2))
         for m, g in enumerate(unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]):
             pressure[near_points, m] += w * np.einsum("qi,qi->q", outward_normal, g[:, :, 0])
+            shear[near_points, m] -= sign * w * np.einsum("qi,qi->q", along, g[:, :, 0])
             if not is_bent:
                 continue
             sigma = tip_material.stress(g)
@@ -161,7 +168,7 @@ def _faces(
         if is_bent:
             at = tabulate_functions(space, Points(cell, bary, lips.weight[near_points], side))
             parts.append(GoalPoints(at, factor))
-    return parts, pressure, per_stress
+    return parts, tractions, per_stress
 
 
 def on_faces(solution: Solution, tips: Sequence[int], lips: LipPoints) -> tuple[Floats, Floats]:
