@@ -14,7 +14,7 @@ import xcrack as xc
 from support.scenes_fronts import graded, lines
 from xcrack.growth import joins_3d
 from xcrack.growth.alarms import alarm_of_energy
-from xcrack.growth.gaps import amplification, part_of_time
+from xcrack.growth.gaps import amplification, annulus_factors, closing_annulus, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import numbers_after
 from xcrack.mesh.triangulation import face_areas
@@ -281,6 +281,62 @@ def test_the_last_ligament_breaks_sooner():
     assert parts == sorted(parts)
     assert parts[-1] < 1
     assert part_of_time(0.5, 6.0) < part_of_time(0.5, 3.0)
+
+
+def test_K_of_annuli():
+    """The fit against the opening of a penny that is zero within the ligament (3e-4)."""
+    for x in (0.02, 0.1, 0.3, 0.5, 0.7, 0.85):
+        inner, outer = annulus_factors(x)
+        assert (inner / np.sqrt(x), outer) == pytest.approx(annulus(x, 1.0), rel=3e-4)
+
+
+@pytest.mark.parametrize("m", [2.0, 3.0])
+@pytest.mark.parametrize(("inner", "outer"), [(0.24, 0.72), (0.35, 0.6)])
+def test_the_time_of_a_round_ligament(m, inner, outer):
+    """Both fronts by the K of the integral equation, in 40 steps: cycles and advance to .5 %."""
+    first = tuple(K**m for K in annulus(inner, outer))
+    cycles, advance, rate = closing_annulus(inner, outer, first, m)
+    n, b, N, last = 40, outer, 0.0, 0.0
+    for k in range(n):
+        c, way = inner * (1 - (k + 0.5) / n) ** 2, inner * (2 * (n - k) - 1) / n**2
+        rates = [K**m for K in annulus(c, b + last / 2)]
+        last = way * rates[1] / rates[0]
+        N, b = N + way / rates[0], b + last
+    assert cycles == pytest.approx(N, rel=5e-3)
+    assert advance == pytest.approx(b - outer, rel=2e-2)
+    assert rate == pytest.approx((2 / np.pi * np.sqrt(outer + advance)) ** m, rel=1e-3)
+    # A body that gives way on the whole makes it shorter, by less than at its end.
+    softer = closing_annulus(inner, outer, first, m, 2.0)
+    assert cycles / 2 < softer[0] < cycles
+    assert softer[2] == pytest.approx(2 * rate, rel=0.05)
+
+
+def annulus(c, b, n=8, points=60):
+    """K of the inner and the outer front of an annulus under unit pressure, over sqrt(pi).
+
+    The ligament r < c presses with a sum of r^2k / sqrt(c^2 - r^2) such that the opening of the
+    penny vanishes at n radii: of w(r) = ∫_r^b g(s) / sqrt(s^2 - r^2) ds, g(s) = s for the pressure.
+    """
+    u, w = np.polynomial.legendre.leggauss(points)
+    u, w = (u + 1) / 2, w / 2
+
+    def g(s):
+        least, most = np.minimum(s, c), np.maximum(s, c)
+        d = np.sqrt(np.maximum(most**2 - least**2, 1e-24))
+        q = np.arcsinh(least / d)
+        t2 = np.maximum(least[:, None] ** 2 - (d[:, None] * np.sinh(q[:, None] * u)) ** 2, 0.0)
+        return np.stack([q * ((t2 / c**2) ** k @ w) for k in range(n)], axis=1)
+
+    r = c * np.sin((np.arange(n) + 0.5) / n * np.pi / 2)
+    opening, pressed = np.zeros(n), np.zeros((n, n))
+    for i, ri in enumerate(r):
+        at_c, at_b = np.sqrt(c * c - ri * ri), np.sqrt(b * b - ri * ri)
+        z = np.concatenate([at_c * (1 - (1 - u) ** 4), at_c + (at_b - at_c) * u**4])
+        weight = np.concatenate([4 * at_c * (1 - u) ** 3 * w, 4 * (at_b - at_c) * u**3 * w])
+        s = np.sqrt(ri * ri + z * z)
+        opening[i], pressed[i] = weight.sum(), (weight / s) @ g(s)
+    a = np.linalg.solve(pressed, opening)
+    return a.sum() / np.sqrt(c), 2 / np.pi * (b - float((g(np.array([b])) @ a)[0])) / np.sqrt(b)
 
 
 def fabrikant(gap, radial=20, around=64):

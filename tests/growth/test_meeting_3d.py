@@ -207,35 +207,66 @@ def test_the_inner_front_of_an_annulus_closes():
     assert last.K_I.mean() == pytest.approx(K, rel=0.05)
 
 
-def test_cycles_of_a_ligament_inside_a_crack():
-    """In the step that breaks it, against steps a third as long: within 20 %, and late.
+@pytest.mark.parametrize(
+    ("radii", "cells", "m", "da"), [((0.24, 0.72), 20, 3.0, 0.075), ((0.3, 0.6), 20, 2.0, 0.08)]
+)
+def test_cycles_of_a_ligament_inside_a_crack(radii, cells, m, da):
+    """Against steps a third as long, to 5 %; what a step over it releases is G dA, to 20 %.
 
-    K of a round ligament goes with the radius of the outer front over the root of its own; it was
-    22 % with the first constant. At the rate of the beginning it would be 1 + m/2 times as long.
+    G dA is that of the annulus whose ligament closes: as the mean of G at both ends of the step,
+    times its area, the exact solution has .3 to .6 of it.
     """
+    law = xc.paris(C=1e-6 / 100**m, m=m)
+    problem = scene_of(arc_crack(*radii, 0.0), cells)
     whole, part = (
-        xc.collect(grow(scene_of(arc_crack(0.24, 0.72, 0.0), 20), da=da, max_steps=steps))
-        for da, steps in ((0.07, 2), (0.025, 5))
+        xc.collect(grow(problem, law, da=d, max_steps=steps)) for d, steps in ((da, 3), (da / 3, 8))
     )
-    (join,) = whole.joins
-    assert join.step == 1
+    (join,), (later_join,) = whole.joins, part.joins
     areas, cycles = (
         np.array([f(step) for step in part.steps])
         for f in (lambda step: meeting_energy.areas(step).sum(), lambda step: step.cycles)
     )
-    finer = np.interp(meeting_energy.areas(whole.steps[1]).sum(), areas, cycles)
+    after = whole.steps[join.step]
+    finer = np.interp(meeting_energy.areas(after).sum(), areas, cycles)
     print(f"\n{join.N:.0f} for {finer:.0f}")
-    assert finer < join.N < 1.2 * finer
+    assert join.N == after.cycles == pytest.approx(finer, rel=0.05)
+    for history, k in ((whole, join.step), (part, later_join.step)):
+        before, after = history.steps[k - 1 : k + 1]
+        by_K = meeting_energy.released_by_annulus(before, after, E, NU, m)
+        more = after.solutions[-1].energy - before.solutions[-1].energy
+        print(f"released {more / by_K:.3f}")
+        assert more == pytest.approx(by_K, rel=0.2)
 
 
 def test_the_ends_of_an_arc_meet():
-    """A C becomes an annulus, and that a disc."""
-    history = xc.collect(grow(scene_of(arc_crack(0.33, 0.57, 0.35), 18), da=0.08, max_steps=5))
+    """Of a C whose ends are close: it becomes an annulus, and that a disc."""
+    history = xc.collect(grow(scene_of(arc_crack(0.3, 0.6, 0.16), 18), da=0.08, max_steps=5))
     assert len(history.steps) == 5, history.ended
     assert [join.cracks for join in history.joins] == [(0, 0)] * 2
     fronts = [len(step.cracks[0].fronts) for step in history.steps]
-    assert (fronts[0], max(fronts), fronts[-1]) == (1, 2, 1)
+    assert (max(fronts), fronts[-1]) == (2, 1)
     rising(history)
+
+
+def test_two_meshes_agree_over_a_slit_that_closes():
+    """Ends of a C that grow slowly: the ligament inside is a slit, and closes from its end.
+
+    N between two energies before and after, on cells of .13 and .1, to 4 %; it was 16 %.
+    """
+    spans = []
+    for cells in (18, 24):
+        history = xc.collect(
+            grow(scene_of(arc_crack(0.33, 0.57, 0.35), cells), da=0.08, max_steps=7)
+        )
+        assert len(history.steps) == 7, history.ended
+        (join,) = history.joins
+        assert join.cracks == (0, 0)
+        assert [len(step.cracks[0].fronts) for step in history.steps] == [1] * 7
+        rising(history)
+        energy = [step.solutions[-1].energy for step in history.steps]
+        spans.append(np.diff(np.interp([0.425, 0.5], energy, [s.cycles for s in history.steps]))[0])
+    print(f"\n{spans[0]:.0f} for {spans[1]:.0f}")
+    assert spans[0] == pytest.approx(spans[1], rel=0.04)
 
 
 @pytest.mark.parametrize("seed", [6, 10])
@@ -339,10 +370,10 @@ def test_sheets_that_cross_beside_their_join_release_what_K_says():
 @pytest.mark.parametrize("cells", [18, 24])
 def test_a_grown_arc_is_cut_over_its_area(cells):
     """Ends that look at each other: their prolongations lie over the faces. Area to 1 %."""
-    history = xc.collect(grow(scene_of(arc_crack(0.33, 0.57, 0.35), cells), da=0.08, max_steps=6))
-    assert len(history.steps) == 6, history.ended
+    history = xc.collect(grow(scene_of(arc_crack(0.33, 0.57, 0.35), cells), da=0.08, max_steps=7))
+    assert len(history.steps) == 7, history.ended
     cut = [float(meeting_energy.cut_shares(step)[0]) for step in history.steps]
     _, more, by_K = meeting_energy.released(history.steps, E, NU)
     print(f"\ncut {np.round(cut, 4)}, released {np.round(more / by_K, 3)}")
-    assert cut == pytest.approx(np.ones(6), abs=0.01)
+    assert cut == pytest.approx(np.ones(7), abs=0.01)
     assert history.joins

@@ -3,6 +3,7 @@
 import numpy as np
 
 from xcrack.crack.junctions_3d import body_of
+from xcrack.growth.gaps import annulus_factors
 from xcrack.mesh.locate import Body
 
 SAMPLES = 12  # along each side of a face
@@ -53,6 +54,38 @@ def unbalanced(steps, E, nu):
     """What of the energy of each step after the first no release over the new area explains."""
     energy, more, by_K = released(steps, E, nu)
     return (more - by_K) / energy
+
+
+def released_by_annulus(before, after, E, nu, m, n=400):
+    """Integral of G dA over the step that breaks the ligament of an annulus about the z-axis.
+
+    K of both fronts goes on from what was solved before it as that of an annulus does, and comes to
+    what was solved behind it.
+    """
+    sif = before.sif[-1][0]
+    radii = np.linalg.norm(sif.x[:, :2], axis=1)
+    rows = [sif.front == f for f in np.unique(sif.front)]
+    inner, outer = sorted(rows, key=lambda of: radii[of].mean())
+    c, b = (radii[of].mean() for of in (inner, outer))
+    first = np.array([(sif.K_I[of] ** 2).mean() * (1 - nu**2) / E for of in (inner, outer)])
+    speed = before.rate[0][outer].mean() / before.rate[0][inner].mean()
+    disc = after.sif[-1][0]
+    last = (disc.K_I**2).mean() * (1 - nu**2) / E
+
+    def ratios(c, b):  # of K, that of the inner front times the root of its radius
+        return np.array(annulus_factors(c / b)) * [b, np.sqrt(b)]
+
+    start, energy, radius = ratios(c, b), 0.0, c
+    final = ratios(0.0, np.linalg.norm(disc.x[:, :2], axis=1).mean())
+    beside = last / first[1] / (final[1] / start[1]) ** 2
+    for s in 1 - (np.arange(n) + 0.5) / n:
+        radius, way = c * s**2, 2 * c * s / n
+        K = ratios(radius, b) / start / [s, 1.0]
+        G = first * K**2 * beside ** (1 - s**2)
+        growth = way * speed * (K[1] / K[0]) ** m
+        energy += 2 * np.pi * (G[0] * radius * way + G[1] * b * growth)
+        b += growth
+    return energy
 
 
 def cut_shares(step):

@@ -113,14 +113,22 @@ def _points_near(crack: Crack, crack_b: Crack, body: Body, reach: float) -> tupl
     box_min, box_max = crack_b.points.min(axis=0) - reach, crack_b.points.max(axis=0) + reach
     parts = [np.zeros((0, 6))]
     for front in front_frames(crack):
-        number = np.arange(len(front.x) + front.is_closed)
-        t = np.linspace(0, number[-1], _BETWEEN * number[-1] + 1)
-        corners = np.hstack([front.x, front.frame[:, 1]])[number % len(front.x)]
-        parts.append(np.stack([np.interp(t, number, column) for column in corners.T], axis=1))
+        values = _values_along(front)
+        parts.append(np.hstack([values[:, 0], values[:, 2]]))
     points, normals = np.split(np.concatenate(parts), 2, axis=1)
     rows = np.nonzero(((points >= box_min) & (points <= box_max)).all(axis=1))[0]
     rows = rows[body.contains(points[rows])]
     return points[rows], unit(normals[rows])
+
+
+def _values_along(front: Front) -> Floats:
+    """Places close along a front, directions ahead and normals `(n, 3, 3)`, these not unit."""
+    number = np.arange(len(front.x) + front.is_closed)
+    t = np.linspace(0, number[-1], _BETWEEN * number[-1] + 1)
+    corners = np.concatenate([front.x[:, None], front.frame[:, :2]], axis=1)
+    columns = corners.reshape(-1, 9)[number % len(front.x)].T
+    values = [np.interp(t, number, column) for column in columns]
+    return np.stack(values, axis=1).reshape(-1, 3, 3)
 
 
 def _is_on_front(crack: Crack, x: Floats, tolerance: float) -> bool:
@@ -238,8 +246,8 @@ def own_gap(crack: Crack, body: Body, reach: float) -> OwnGap | None:
     fronts = [front for front in front_frames(crack) if front.is_closed]  # open: `joined_fronts`
     if not fronts:
         return None
-    x = np.concatenate([front.x for front in fronts])
-    t, n = np.concatenate([front.frame[:, :2] for front in fronts]).transpose(1, 0, 2)
+    x, t, n = np.concatenate([_values_along(front) for front in fronts]).transpose(1, 0, 2)
+    t, n = unit(t), unit(n)
     size = body.cell_size(x)
     pairs = cKDTree(x).query_pairs(reach * float(size.max()), output_type="ndarray")
     way = x[pairs[:, 1]] - x[pairs[:, 0]]
@@ -296,6 +304,8 @@ def _with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) ->
     parts.sort(key=lambda part: float(np.linalg.norm(fronts[part[0]].x[part[1]] - x, axis=1).min()))
     if len(parts) > 2 and _faces(fronts, *parts[:2]):
         parts = parts[:2]
+    if len(parts) == 1:  # the end of a slit between faces of the crack
+        return _with_slit_filled(crack, fronts, *parts[0], size)
     if len(parts) != 2:
         raise GeometryError(
             f"{len(parts)} pieces of the fronts of one crack face each other near {at(x)}: the "
@@ -319,6 +329,35 @@ def _with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) ->
         crack_without_ends, pair, rest, (find_blocked(0), find_blocked(1)), radius, size
     )
     return replace(closed_crack, ends_on=crack.ends_on)
+
+
+def _with_slit_filled(
+    crack: Crack, fronts: Sequence[Front], number: int, run: Ints, size: float
+) -> Crack:
+    """A crack with faces in a slit around which one piece of a front runs."""
+    front = fronts[number]
+    (part,) = _runs(front, np.isin(np.arange(len(front.x)), run))
+    place = list(part.place)
+    facing_share = front.frame[place[0], 0] @ front.frame[place[-1], 0]
+    if any(part.ends) or len(set(place)) < len(place) or facing_share > 0:
+        raise GeometryError(
+            f"one piece of a front faces itself near {at(front.x[run].mean(axis=0))}: the ligament "
+            "inside cannot be closed. End growth before, or give what has joined."
+        )
+    mouth = _arc(front, place[-1], front, place[0], size)
+    mouth_number = len(crack.points) + np.arange(len(mouth))
+    outline = np.concatenate([front.number[place], mouth_number])
+    triangles = _triangles(
+        np.concatenate([front.x[place], mouth]), front.frame[place, 1].mean(axis=0)
+    )
+    next_number = dict(side for f in fronts for side in _sides(f))
+    for used_number in front.number[place[:-1]]:
+        next_number.pop(int(used_number), None)
+    line = [front.number[place[0]], *mouth_number[::-1], front.number[place[-1]]]
+    next_number.update({int(p): int(q) for p, q in zip(line, line[1:])})
+    points = np.concatenate([crack.points, mouth])
+    faces = np.concatenate([crack.faces, outline[triangles]])
+    return Crack(points, faces, None, tuple(_chains(next_number)), crack.ends_on)
 
 
 def _faces(fronts: Sequence[Front], p: tuple[int, Ints], q: tuple[int, Ints]) -> bool:

@@ -40,7 +40,7 @@ from xcrack.crack.placing_3d import meeting_points, place_arm, place_arms
 from xcrack.fem.system import discretise
 from xcrack.growth import euler, fronts
 from xcrack.growth.fronts import interpolate_along_front
-from xcrack.growth.gaps import UNKNOWN_OF_FRONTS, part_of_time
+from xcrack.growth.gaps import UNKNOWN_OF_FRONTS, closing_annulus, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
@@ -52,6 +52,7 @@ from xcrack.mesh.mesh import Mesh
 _LIGAMENT = 0.9  # cells: radius of a ligament inside a front below which it breaks
 _OWN = "of the same crack"  # what advancing says of a front that meets its own crack
 _NEAR = 1.1  # cells between fronts below which they join: closer ones cannot be solved
+_NEAR_OWN = 0.65  # the same of fronts of one crack that face each other: K is 5 to 9 % low there
 _WIDER = 0.75  # of a gap: the disc is as large where a step leads across
 _STEEP = 0.5  # of the height of a step of a cell or more: the gap over which it leads
 _AHEAD = 1.8  # legs of cells before a face in which no front can be solved: it is led through
@@ -266,43 +267,77 @@ def _joined_cracks(
 
 def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) -> Plan | None:
     """A plan in which a ligament inside one crack breaks within its advance; None without one."""
-    inner_front = _inner_front(step, plan, body)
-    if inner_front is None:
-        facing_share = _facing_share(rule, step, plan, body)
-        if facing_share is None:
+    ligament = _closing_ligament(step, plan, body)
+    m = solves_of(step)[1].exponent
+    if ligament is None:
+        gap_met = _facing_gap(rule, step, plan, body)
+        if gap_met is None:
             return None
-        c, way, gap = facing_share
+        c, way, gap = gap_met
         cracks_apart = _cracks_after(rule, step, plan, way)
         crack = with_own_gap_closed(cracks_apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
-        x, time, gain = gap.x, way, 1.0
+        time = _time_of_gap(step, plan, c, way, gap, (cracks_apart[c], crack), body)
+        x = gap.x
+        cycles = time * plan.cycles / _gain(step, cracks_apart, body.mesh, m)
     else:
-        c, f, time = inner_front
+        c, f = ligament.crack, ligament.front
         stations = solves_of(step)[0]
-        moves = (stations.crack != c) | (stations.front != f)
-        arc = np.where(moves, time * plan.arc, 0.0)
-        cracks_apart = _INTEGRATORS[rule.integrator].advanced_cracks(rule, step, arc)
+        cycles, advance, _ = closing_annulus(*ligament.values, m)
+        longest_share = max(1.0, ligament.cell / plan.largest)
+        way = min(cycles / plan.cycles, longest_share)
+        cycles = way * plan.cycles
+        share = np.full(len(stations), way)
+        is_of_crack = stations.crack == c
+        if ligament.outer_way > 0:
+            share[is_of_crack] = min(advance / ligament.outer_way, longest_share)
+        share[is_of_crack & (stations.front == f)] = 0.0
+        cracks_apart = _INTEGRATORS[rule.integrator].advanced_cracks(rule, step, share * plan.arc)
         crack, x = without_inner_front(cracks_apart[c], f)
-        # The load on a ligament goes with the opening, that with the radius around it, so that K
-        # of the ligament grows like it: twice as fast as that of the front outside.
-        discs = [without_inner_front(step.corrected[c], f)[0], crack]
-        area, new_area = (crack_areas([disc], body.mesh)[0] for disc in discs)
-        gain = _gain_of(new_area / area, solves_of(step)[1].exponent, 1.0)
     cracks_now = [crack if k == c else crack_apart for k, crack_apart in enumerate(cracks_apart)]
-    cycles = time * plan.cycles / gain
     join = Join(step.index + 1, step.cycles + cycles, tuple(x.tolist()), (c, c))
     return replace(
-        plan, part=min(time, 1.0), cycles=cycles, error=UNKNOWN_OF_FRONTS * cycles,
+        plan, part=min(way, 1.0), cycles=cycles, error=UNKNOWN_OF_FRONTS * cycles,
         cracks=tuple(cracks_now),
         apart=tuple(cracks_apart), joins=(join,), limit="", refusal="",
     )  # fmt: skip
 
 
-def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] | None:
-    """A closed front that will have closed around a ligament: crack, front, share of the advance.
+@dataclass(frozen=True)
+class _Ligament:
+    """A round ligament inside a crack, as that of an annulus of the same area.
 
-    Where less than a cell and a half would be left of its radius the ligament breaks.
+    Attributes
+    ----------
+    crack, front : int
+        Which, and its closed front around the ligament.
+    inner_radius, outer_radius : float, length
+    inner_rate, outer_rate : float, length/cycle
+        Means along the fronts.
+    inner_way, outer_way : float, length
+        Means of what is planned.
+    cell : float, length
+        Size of the cells there.
     """
-    stations = solves_of(step)[0]
+
+    crack: int
+    front: int
+    inner_radius: float
+    outer_radius: float
+    inner_rate: float
+    outer_rate: float
+    inner_way: float
+    outer_way: float
+    cell: float
+
+    @property
+    def values(self) -> tuple[float, float, tuple[float, float]]:
+        """Radii and rates, as `closing_annulus` takes them."""
+        return self.inner_radius, self.outer_radius, (self.inner_rate, self.outer_rate)
+
+
+def _ligaments(step: Step, plan: Plan, body: Body) -> Iterator[_Ligament]:
+    """Closed fronts around ligaments that grow."""
+    stations, solves = solves_of(step)
     for c, crack in enumerate(step.corrected):
         for f, front in enumerate(front_frames(crack)):
             if not front.is_closed or len(crack.fronts or ()) < 2:
@@ -310,25 +345,38 @@ def _inner_front(step: Step, plan: Plan, body: Body) -> tuple[int, int, float] |
             outward_way = front.x.mean(axis=0) - front.x
             if np.einsum("ij,ij->i", outward_way, front.frame[:, 0]).mean() <= 0:
                 continue
-            rows = (stations.crack == c) & (stations.front == f)
+            is_inner = (stations.crack == c) & (stations.front == f)
+            is_outer = (stations.crack == c) & (stations.front != f)
+            if not is_inner.any() or plan.arc[is_inner].mean() <= 0:
+                continue
+            rates, ways = (
+                [float(values[rows].mean()) if rows.any() else 0.0 for rows in (is_inner, is_outer)]
+                for values in (np.where(plan.arc > 0, solves.rate[-1], 0.0), plan.arc)
+            )
+            disc_area = crack_areas([without_inner_front(crack, f)[0]], body.mesh)[0]
             radius = float(np.linalg.norm(outward_way, axis=1).max())
-            way = float(plan.arc[rows].mean()) if rows.any() else 0.0
-            cell = float(body.cell_size(front.x).mean())
-            if radius - way < _LIGAMENT * cell and way > 0:
-                # K of a round ligament goes with one over the root of its radius (a flat punch).
-                part = 1 / (1 + solves_of(step)[1].exponent / 2)
-                return c, f, min(part * radius / way, max(1.0, cell / plan.largest))
+            yield _Ligament(
+                c, f, radius, max(float(np.sqrt(disc_area / np.pi)), radius), *rates, *ways,
+                float(body.cell_size(front.x).mean()),
+            )  # fmt: skip
+
+
+def _closing_ligament(step: Step, plan: Plan, body: Body) -> _Ligament | None:
+    """A ligament of whose radius less than a cell would be left: it breaks."""
+    for ligament in _ligaments(step, plan, body):
+        if ligament.inner_radius - ligament.inner_way < _LIGAMENT * ligament.cell:
+            return ligament
     return None
 
 
-def _facing_share(
+def _facing_gap(
     rule: GrowthRule, step: Step, plan: Plan, body: Body
 ) -> tuple[int, float, OwnGap] | None:
     """Crack whose fronts come to face each other, the share of the advance, and the gap then."""
 
     def nearest_gap(share: float) -> tuple[int, OwnGap] | None:
         cracks_now = plan.cracks if share == 1.0 else _cracks_after(rule, step, plan, share)
-        gaps = [(c, own_gap(crack, body, _NEAR)) for c, crack in enumerate(cracks_now)]
+        gaps = [(c, own_gap(crack, body, _NEAR_OWN)) for c, crack in enumerate(cracks_now)]
         open_gaps = [(c, gap) for c, gap in gaps if gap is not None]
         return min(open_gaps, key=lambda pair: pair[1].width, default=None)
 
@@ -340,7 +388,7 @@ def _facing_share(
             return gap_met[0], 1.0, gap_met[1]
     elif _OWN not in plan.refusal:
         return None
-    s_min, s_max = 0.0, 1.0
+    s_min, s_max, last_met = 0.0, 1.0, None
     for _ in range(_TRIES):
         share = 0.5 * (s_min + s_max)
         try:
@@ -348,10 +396,53 @@ def _facing_share(
         except GeometryError:
             s_max = share
             continue
-        if gap_met is not None and gap_met[1].width > _LEFT * gap_met[1].size:
-            return gap_met[0], share, gap_met[1]
-        s_min, s_max = (s_min, share) if gap_met is not None else (share, s_max)
-    return None
+        if gap_met is None:  # not there yet
+            s_min = share
+        elif gap_met[1].width <= _LEFT * gap_met[1].size:
+            s_max = share
+        else:
+            s_min, last_met = share, (gap_met[0], share, gap_met[1])
+            if gap_met[1].width <= 2 * _LEFT * gap_met[1].size:
+                break
+    return last_met
+
+
+def _time_of_gap(
+    step: Step, plan: Plan, c: int, way: float, gap: OwnGap, cracks: tuple[Crack, Crack], body: Body
+) -> float:
+    """When fronts of one crack that face each other have met, in shares of an advance.
+
+    Ends of arms amplify K of each other as pennies of half their width do (4 % more where the gap
+    is a tenth of that or less). What is closed at once is no larger than what fronts make in the
+    time, where the ends grow more slowly than the others.
+
+    Parameters
+    ----------
+    step : Step
+    plan : Plan
+    c : int
+    way : float
+        Share of the advance after which the gap is closed.
+    gap : OwnGap
+        That is left then.
+    cracks : (Crack, Crack)
+        The crack with the gap, and without.
+    body : Body
+    """
+    reach = (gap.width + 2 * way * plan.largest) / gap.size
+    first_gap = own_gap(step.corrected[c], body, 1.01 * reach)
+    area, area_apart, area_joined = (
+        crack_areas([crack], body.mesh)[0] for crack in (step.corrected[c], *cracks)
+    )
+    growth = max(area_apart - area, 1e-3 * area)
+    longest_time = way * (1 + max(area_joined - area_apart, 0.0) / growth)
+    if first_gap is None or first_gap.width <= gap.width:
+        return float(longest_time)
+    way_of_gap = way * first_gap.width / (first_gap.width - gap.width)
+    half_width = float(step.sizes[c])  # of arms: their area over the length of both sides
+    m = solves_of(step)[1].exponent
+    time = way_of_gap * part_of_time(first_gap.width / half_width, m, 3)
+    return float(min(time, longest_time))
 
 
 def _cracks_after(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
@@ -364,9 +455,36 @@ def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identit
     plan = plan_of(step)
     place = tuple(_errors(step, sif.x, mesh) for sif in rates.sif[0])
     error = StepError(place, cycles_before + plan.error)
-    return _INTEGRATORS[rule.integrator].begin_at(
+    result = _INTEGRATORS[rule.integrator].begin_at(
         rule, rates, identities, step.cycles + plan.cycles, error, step
     )
+    share = _share_of_cycles(step, plan, result, rates.problem.sizes, Body.of(mesh))
+    if share == 1.0:
+        return result
+    return replace(result, cycles=step.cycles + share * plan.cycles)
+
+
+def _share_of_cycles(step: Step, plan: Plan, result: Corrected, sizes: Floats, body: Body) -> float:
+    """Cycles of a ligament that broke inside a crack by the rates after it, over those before."""
+    c = plan.joins[0].cracks[0]
+    if set(plan.joins[0].cracks) != {c} or len(plan.cracks) != len(step.corrected):
+        return 1.0
+    m = solves_of(step)[1].exponent
+    later_rate = result.solves.rate[-1][result.stations.crack == c]
+    if not (len(later_rate) and np.isfinite(later_rate).all() and later_rate.mean() > 0):
+        return 1.0
+    lines = [set(line.tolist()) for line in plan.cracks[c].fronts or ()]
+    waiting_lines = [line.tolist() for line in plan.apart[c].fronts or ()]
+    for ligament in _ligaments(step, plan, body):
+        front = (step.corrected[c].fronts or ())[ligament.front].tolist()
+        if ligament.crack != c or front not in waiting_lines or set(front) in lines:
+            continue
+        cycles, _, rate = closing_annulus(*ligament.values, m)
+        if rate == 0:
+            return 1.0
+        beside = float(later_rate.mean()) / rate
+        return closing_annulus(*ligament.values, m, beside)[0] / cycles
+    return 1.0
 
 
 def _faces_near(cracks: Sequence[Crack], body: Body) -> list[FaceAhead]:
