@@ -283,6 +283,41 @@ def test_the_last_ligament_breaks_sooner():
     assert part_of_time(0.5, 6.0) < part_of_time(0.5, 3.0)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.25, 0.5, 1.0])
+def test_ends_of_arms_amplify_as_pennies_do(gap):
+    """Strips 2 wide and 7 long with round ends, pressed open in a body without sides (4 %).
+
+    Their traction is that of |k| w by Fourier transforms; K goes with w² over the distance.
+    """
+    n, length = 512, 16.0
+    h, k = length / n, 2 * np.pi * np.fft.fftfreq(n, length / n)
+    K = np.hypot(k[:, None], k[None, : n // 2 + 1])
+    x = (np.arange(n) - n / 2 + 0.5) * h
+    X, Y = np.meshgrid(x, x, indexing="ij")
+    along = np.abs(X) - gap / 2
+    arms = np.hypot(along - np.clip(along, 1, 6), Y) < 1
+
+    def filtered(w, factor, mask):
+        return np.where(mask, np.fft.irfft2(factor * np.fft.rfft2(w), s=w.shape), 0.0)
+
+    def opened(mask):
+        w, r = np.zeros((n, n)), mask * 1.0
+        p = z = filtered(r, 1 / (K + 2 / length), mask)
+        while np.abs(r).max() > 1e-5:
+            q, rz = filtered(p, K, mask), (r * z).sum()
+            w, r = w + rz / (p * q).sum() * p, r - rz / (p * q).sum() * q
+            z = filtered(r, 1 / (K + 2 / length), mask)
+            p = z + (r * z).sum() / rz * p
+        row, distance = w[:, n // 2], x - gap / 2
+        near = (distance > h) & (distance < 5 * h)
+        return np.sqrt((row[near] ** 2 / distance[near]).mean())
+
+    ratio = opened(arms) / opened(arms & (X > 0))
+    print(f"\n{ratio:.3f} for {float(amplification(gap)):.3f}")
+    assert ratio == pytest.approx(float(amplification(gap)), rel=0.04)
+
+
 def test_K_of_annuli():
     """The fit against the opening of a penny that is zero within the ligament (3e-4)."""
     for x in (0.02, 0.1, 0.3, 0.5, 0.7, 0.85):

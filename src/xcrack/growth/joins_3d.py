@@ -349,16 +349,22 @@ def _ligaments(step: Step, plan: Plan, body: Body) -> Iterator[_Ligament]:
             is_outer = (stations.crack == c) & (stations.front != f)
             if not is_inner.any() or plan.arc[is_inner].mean() <= 0:
                 continue
-            rates, ways = (
-                [float(values[rows].mean()) if rows.any() else 0.0 for rows in (is_inner, is_outer)]
-                for values in (np.where(plan.arc > 0, solves.rate[-1], 0.0), plan.arc)
-            )
+            rate = np.where(plan.arc > 0, solves.rate[-1], 0.0)
             disc_area = crack_areas([without_inner_front(crack, f)[0]], body.mesh)[0]
             radius = float(np.linalg.norm(outward_way, axis=1).max())
-            yield _Ligament(
-                c, f, radius, max(float(np.sqrt(disc_area / np.pi)), radius), *rates, *ways,
-                float(body.cell_size(front.x).mean()),
-            )  # fmt: skip
+            ligament = _Ligament(
+                crack=c,
+                front=f,
+                inner_radius=radius,
+                outer_radius=max(float(np.sqrt(disc_area / np.pi)), radius),
+                inner_rate=float(rate[is_inner].mean()),
+                outer_rate=float(rate[is_outer].mean()) if is_outer.any() else 0.0,
+                inner_way=float(plan.arc[is_inner].mean()),
+                outer_way=float(plan.arc[is_outer].mean()) if is_outer.any() else 0.0,
+                cell=float(body.cell_size(front.x).mean()),
+            )
+            if ligament.inner_rate > 0:
+                yield ligament
 
 
 def _closing_ligament(step: Step, plan: Plan, body: Body) -> _Ligament | None:
@@ -412,9 +418,8 @@ def _time_of_gap(
 ) -> float:
     """When fronts of one crack that face each other have met, in shares of an advance.
 
-    Ends of arms amplify K of each other as pennies of half their width do (4 % more where the gap
-    is a tenth of that or less). What is closed at once is no larger than what fronts make in the
-    time, where the ends grow more slowly than the others.
+    Ends of arms amplify K of each other as pennies of half their width do (to 2 %). What is closed
+    at once takes no longer than fronts take for as much area, where the ends are slower than they.
 
     Parameters
     ----------
@@ -458,13 +463,13 @@ def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identit
     result = _INTEGRATORS[rule.integrator].begin_at(
         rule, rates, identities, step.cycles + plan.cycles, error, step
     )
-    share = _share_of_cycles(step, plan, result, rates.problem.sizes, Body.of(mesh))
+    share = _share_of_cycles(step, plan, result, Body.of(mesh))
     if share == 1.0:
         return result
     return replace(result, cycles=step.cycles + share * plan.cycles)
 
 
-def _share_of_cycles(step: Step, plan: Plan, result: Corrected, sizes: Floats, body: Body) -> float:
+def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> float:
     """Cycles of a ligament that broke inside a crack by the rates after it, over those before."""
     c = plan.joins[0].cracks[0]
     if set(plan.joins[0].cracks) != {c} or len(plan.cracks) != len(step.corrected):
