@@ -256,7 +256,7 @@ def test_no_face_ahead_is_not_looked_at(monkeypatch):
     def never(*arguments):
         raise AssertionError(f"asked with {len(arguments)} arguments")
 
-    monkeypatch.setattr(joins_3d, "_advanced", never)
+    monkeypatch.setattr(joins_3d, "_cracks_after", never)
     outline = [(0.85, y, z) for y, z in ((-1.5, -0.5), (1.5, -0.5), (1.5, 0.5), (-1.5, 0.5))]
     cracks = [xc.penny_crack((-0.1, 0.02, 0.03), (0, 0, 1), 0.4), xc.plane_crack(outline)]
     mesh, body = xc.box((-1.2, -1, -1), (1.2, 1, 1), (12, 10, 10)), xc.Isotropic(1000.0, 0.3)
