@@ -83,11 +83,10 @@ def annulus_factors(x: float) -> tuple[float, float]:
     """
     strip = np.sqrt((1 - x) / 2)
 
-    def fitted(limit: float, bend: tuple[float, float]) -> float:
-        factor = limit + (1 - limit) * x + x * (1 - x) * (bend[0] + bend[1] * x)
-        return float(strip * factor)
+    def factor(limit: float, bend: tuple[float, float]) -> float:
+        return float(strip * (limit + (1 - limit) * x + x * (1 - x) * (bend[0] + bend[1] * x)))
 
-    return fitted(_INNER, _OF_INNER), fitted(_OUTER, _OF_OUTER)
+    return factor(_INNER, _OF_INNER), factor(_OUTER, _OF_OUTER)
 
 
 def closing_annulus(
@@ -135,10 +134,12 @@ def closing_annulus(
     def slopes(s: float, b: float) -> tuple[float, float]:
         """Of cycles and of b, over s from 1 to 0: the radius of the ligament is that of now, s²."""
         inner_K, outer_K = ratios(inner_radius * s * s, b)
-        beside = growth_beside ** (1 - s * s)
-        rate_of_ligament = inner_rate * (inner_K / first_inner) ** exponent * beside
+        softening = growth_beside ** (1 - s * s)
+        rate_of_ligament = inner_rate * (inner_K / first_inner) ** exponent * softening
         cycles_of_s = 2 * inner_radius * s ** (1 + exponent) / rate_of_ligament
-        return cycles_of_s, cycles_of_s * outer_rate * (outer_K / first_outer) ** exponent * beside
+        return cycles_of_s, cycles_of_s * outer_rate * (
+            outer_K / first_outer
+        ) ** exponent * softening
 
     cycles, b, h = 0.0, outer_radius, 1 / _STEPS
     for k in range(_STEPS):  # the rule of the middle

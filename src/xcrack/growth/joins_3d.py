@@ -487,8 +487,8 @@ def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> f
         cycles, _, rate = closing_annulus(*ligament.values, m)
         if rate == 0:
             return 1.0
-        beside = float(later_rate.mean()) / rate
-        return closing_annulus(*ligament.values, m, beside)[0] / cycles
+        softening = float(later_rate.mean()) / rate
+        return closing_annulus(*ligament.values, m, softening)[0] / cycles
     return 1.0
 
 
