@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from xcrack import Crack, GeometryError, box, penny_crack, plane_crack, surface_crack
+from xcrack.crack.front_chain import stitch_side
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.merging import gap_between, merged_crack, turned_crack
 from xcrack.crack.placing_3d import place_surface
+from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces
 
@@ -130,6 +132,42 @@ def test_cracks_beside_each_other_are_bridged_over_a_small_offset():
     both = merged_crack(one, other, 0.4, 0.1)
     assert len(both.fronts) == 1
     assert face_normals(both.points, both.faces)[:, 2].min() > 0.7
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize(("height", "tilt"), [(0.25, 0.0), (0.0, 0.4), (0.3, -0.3)])
+def test_a_gap_is_closed_alike_in_a_mirror_and_with_other_numbers(axis, height, tilt):
+    """The same surface, whose front begins at the same place, to round-off."""
+
+    def mirrored(crack):
+        points = crack.points * np.where(np.arange(3) == axis, -1.0, 1.0)
+        return whole(surface_crack(points, crack.faces[:, ::-1]))
+
+    one, other = pennies(0.1, height=height, tilt=tilt)
+    smaller = surface_crack(0.9 * other.points + (0.1, 0.04, 0.0), other.faces)
+    both = merged_crack(one, whole(smaller), 0.4, 0.1, 0.82)
+    again = merged_crack(mirrored(smaller), mirrored(one), 0.4, 0.1, 0.82)
+    (front,), (front_again,) = both.fronts, again.fronts
+    x = mirrored(again).points
+    assert np.abs(both.points[front[0]] - x[front_again[0]]).max() < 1e-9
+    assert area(again) == pytest.approx(area(both), rel=1e-9)
+    tree = triangle_tree(both.points, both.faces)
+    assert closest_in(tree, x[again.faces].mean(axis=1)).distance.max() < 1e-9
+
+
+def test_a_quad_is_cut_alike_in_a_mirror():
+    """A twisted strip: of two ways to cut it that are as good, the one that bulges to lip +."""
+    x = np.array([(0, 0, 0.1), (0, 1, -0.1), (1, 0, -0.1), (1, 1, 0.1)])
+    normal, order = np.array([0, 0, -1.0]), [1, 0, 3, 2]
+
+    def faces(corners, numbers, x, normal):
+        return {frozenset(t) for t in stitch_side(corners, numbers, x, normal)[0]}
+
+    assert np.linalg.norm(x[0] - x[3]) == pytest.approx(np.linalg.norm(x[1] - x[2]))
+    cut = faces((0, 1), [2, 3], x, normal)
+    assert faces((1, 0), [3, 2], (x * (1, -1, 1))[order], normal) == cut
+    assert faces((1, 0), [3, 2], (x * (1, 1, -1))[order], -normal) == cut
+    assert faces((1, 0), [3, 2], x[order], -normal) != cut  # the lips exchanged
 
 
 def test_far_cracks_have_no_gap_to_close():

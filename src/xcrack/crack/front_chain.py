@@ -277,6 +277,9 @@ _FLAT = 1e-7  # double area over the square of the longest side of a triangle wi
 _LIKE = 0.95  # a diagonal is as good as another if its worst triangle is at most that much worse
 
 
+_EVEN = 1e-7  # of the cube of its extent: volume between two ways to cut a plane piece
+
+
 def division_points(x: Floats, is_closed: bool, pieces: Ints, is_straight: Bools) -> list[Floats]:
     """Points inside each side of a polyline, which divide it evenly.
 
@@ -339,8 +342,8 @@ def stitch_side(
         area.
     """
     place = [corners[0], corners[1], *numbers]
-    best_triangles: list[tuple[int, int, int]] = []
-    quality, best_cosine = -np.inf, -1.0
+    height = (x - x[0]) @ normal
+    ways, shapes, cosines, bulges = [], [], [], []
     for turn in range(len(numbers)):
         triangles = [(0, q + 3, q + 2) for q in range(turn)]
         triangles.append((0, 1, turn + 2))
@@ -352,16 +355,29 @@ def stitch_side(
         ]
         if not triangles:
             return [], 1.0
-        shape, cosine = _worst_triangle(x, np.array(triangles), normal)
-        # The first way unless another is clearly better: neighbours are cut alike.
-        if shape > (quality / _LIKE if quality > 0 else quality):
-            best_triangles = [(place[a], place[b], place[c]) for a, b, c in triangles]
-            quality, best_cosine = shape, cosine
-    return best_triangles, best_cosine
+        shape, cosine, bulge = _measures_of_strip(x, np.array(triangles), normal, height)
+        ways.append(triangles)
+        shapes.append(shape)
+        cosines.append(cosine)
+        bulges.append(bulge)
+    # Of ways that are as good the one that bulges to lip +: neighbours are cut alike, and so is
+    # what is mirrored. Where none bulges all of them are one surface.
+    best_shape = max(shapes)
+    good_ways = [k for k, shape in enumerate(shapes) if shape >= best_shape * _LIKE]
+    if best_shape <= 0:
+        good_ways = [int(np.argmax(shapes))]
+    limit = max(bulges[k] for k in good_ways) - _EVEN * float(np.ptp(x, axis=0).max()) ** 3
+    way = next(k for k in good_ways if bulges[k] >= limit)
+    return [(place[a], place[b], place[c]) for a, b, c in ways[way]], cosines[way]
 
 
-def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, float]:
-    """Smallest double area along the normal over longest side squared, and cosine to it."""
+def _measures_of_strip(
+    x: Floats, triangles: Ints, normal: Floats, height: Floats
+) -> tuple[float, float, float]:
+    """Smallest double area along the normal over longest side squared, cosine to it, and volume.
+
+    The volume is that below the triangles, down to height zero.
+    """
     a, b, c = (x[triangles[:, i]] for i in range(3))
     area = np.cross(b - a, c - a)
     longest_side = np.maximum(
@@ -372,7 +388,8 @@ def _worst_triangle(x: Floats, triangles: Ints, normal: Floats) -> tuple[float, 
     cosine = np.where(
         total > _FLAT * longest_side, projected_area / np.where(total > 0, total, 1.0), -1.0
     )
-    return float((projected_area / longest_side).min()), float(cosine.min())
+    volume = projected_area @ height[triangles].sum(axis=1) / 6
+    return float((projected_area / longest_side).min()), float(cosine.min()), float(volume)
 
 
 def along_front(s: Floats, values: Floats, place: Floats, is_closed: bool, length: float) -> Floats:

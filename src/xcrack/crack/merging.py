@@ -655,7 +655,7 @@ def _with_gap_closed(
     points, faces = [crack.points], [crack.faces]
     all_fronts = (*pair[0], *pair[1], *rest)
     next_number = dict(side for front in all_fronts for side in _sides(front))
-    count = len(crack.points)
+    count, left_points = len(crack.points), []
     for front, run in runs:
         facing_run = other_runs.pop(_facing_number(front, run, other_runs))
         patch = _patch(front, run, *facing_run, radius, size, count)
@@ -664,8 +664,30 @@ def _with_gap_closed(
         next_number.update(patch.sides)
         points.append(patch.points)
         faces.append(patch.faces)
+        left_points.append(crack.points[patch.used_faces])
         count += len(patch.points)
-    return Crack(np.concatenate(points), np.concatenate(faces), None, tuple(_chains(next_number)))
+    x, gap_middle = np.concatenate(points), np.concatenate(left_points).mean(axis=0)
+    lines = [_with_start(line, all_fronts, x, gap_middle) for line in _chains(next_number)]
+    return Crack(x, np.concatenate(faces), None, tuple(lines))
+
+
+def _with_start(line: Ints, fronts: Sequence[Front], x: Floats, gap_middle: Floats) -> Ints:
+    """A closed front that begins where it did, or, a new one, where it is farthest from the gap.
+
+    Places of K follow from where it begins, so that must not depend on how points are numbered.
+    """
+    if line[0] != line[-1]:
+        return line
+    points = line[:-1]
+    numbers = set(points.tolist())
+    old_starts = [
+        int(f.number[0]) for f in fronts if f.is_closed and set(f.number.tolist()) == numbers
+    ]
+    if old_starts:
+        begin = int(np.nonzero(points == old_starts[0])[0][0])
+    else:
+        begin = int(np.argmax(np.linalg.norm(x[points] - gap_middle, axis=1)))
+    return np.append(np.roll(points, -begin), points[begin])
 
 
 @dataclass(frozen=True)
@@ -835,7 +857,7 @@ def _triangles(x: Floats, normal: Floats) -> Ints:
             f"the gap between two fronts around {at(x.mean(axis=0))} has an outline that crosses "
             "itself: it cannot be closed. Take a smaller da."
         )
-    return without_slivers(plane_points, ear_clipped(plane_points))
+    return without_slivers(plane_points, ear_clipped(plane_points), (x - x.mean(axis=0)) @ normal)
 
 
 def _chains(next_number: dict[int, int]) -> list[Ints]:

@@ -508,7 +508,10 @@ def _placed_crack(crack: Crack, body: Body) -> tuple[Crack, list[ShortFront]]:
             outline = TraceOutline(loop, number >= 0, is_inside, first_time)
             is_inside = is_inside | under_holes(points, faces, outline, body)
         if is_inside.all():
-            fronts.append((int(number[0]), np.append(loop, loop[0])))
+            line = loop
+            if crack.fronts is not None:  # begins where it did: places of K follow from that
+                line = np.roll(loop, -int(np.argmax(loop == crack.fronts[number[0]][0])))
+            fronts.append((int(number[0]), np.append(line, line[0])))
             continue
         outline = TraceOutline(loop, number >= 0, is_inside, first_time)
         points, faces, own_fronts = open_fronts(points, faces, outline, body)

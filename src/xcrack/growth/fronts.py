@@ -15,7 +15,8 @@ from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts import closed_fronts, front_frames
+from xcrack.crack.front_curve import front_curve
+from xcrack.crack.fronts import Front, closed_fronts, front_frames
 from xcrack.crack.measures import crack_size
 from xcrack.crack.placing_3d import place_arm, place_arms
 from xcrack.crack.stations import front_in_body, inside_body, place_crack
@@ -131,9 +132,13 @@ def _closed_fronts(part: GrowthStations) -> list[bool]:
 
 
 def front_lengths(crack: Crack) -> Floats:
-    """Length of each front, length."""
-    fronts = [crack.points[front] for front in crack.fronts or ()]
-    return np.array([np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in fronts])
+    """Length of each front along its curve, as places of K are measured, length."""
+    return np.array([_arcs_of_vertices(front)[-1] for front in front_frames(crack)])
+
+
+def _arcs_of_vertices(front: Front) -> Floats:
+    """Arc length at the vertices of a front; of a closed one also of its first vertex again."""
+    return front_curve(front.x, front.frame, front.is_closed).breaks
 
 
 # Stations and solves of the cracks as they were solved, and as they are corrected.
@@ -203,7 +208,10 @@ def _corrected_part(
         crack=np.full(len(x), c),
         front=number,
         s=np.concatenate(
-            [np.interp(p.number, np.arange(len(f.s)), f.s) for p, f in zip(places, fronts)]
+            [
+                np.interp(p.number, np.arange(len(arcs)), arcs)
+                for p, arcs in zip(places, map(_arcs_of_vertices, fronts))
+            ]
         )[has_rate],
         x=x,
         frame=np.concatenate([p.with_frames(f.frame) for p, f in zip(places, fronts)])[has_rate],

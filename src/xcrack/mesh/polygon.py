@@ -7,6 +7,8 @@ import numpy as np
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.mesh.simplex import boxes_meet
 
+_ON_CIRCLE = 1e-6  # of a half turn, by which four points on one circle may miss it
+
 
 def cross(a: Floats, b: Floats) -> Floats:
     """Area of the parallelogram of vectors `(..., 2)`, positive from a to b to the left."""
@@ -51,12 +53,21 @@ def ear_clipped(polygon: Floats) -> Ints:
     return np.array(triangles, dtype=np.int64)
 
 
-def without_slivers(points: Floats, triangles: Ints) -> Ints:
+def without_slivers(points: Floats, triangles: Ints, height: Floats | None = None) -> Ints:
     """Triangles `(k, 3)` of points in a plane with diagonals flipped until they are Delaunay's.
 
     The outline stays (Lawson, 1977, Software for C1 surface interpolation). Triangles run round
     counter-clockwise before and after.
+
+    Parameters
+    ----------
+    points : (n, 2) array, length
+    triangles : (k, 3) array of int
+    height : (n,) array, length, optional
+        Of the points over the plane: of four on one circle the higher diagonal is taken, which
+        depends on the numbers of points no more than the others do.
     """
+    heights = np.zeros(len(points)) if height is None else height
     faces = [tuple(int(p) for p in face) for face in triangles]
     for _ in range(len(faces) ** 2):
         owner = {(f[k], f[k - 2]): n for n, f in enumerate(faces) for k in range(3)}
@@ -65,7 +76,8 @@ def without_slivers(points: Floats, triangles: Ints) -> Ints:
             if neighbour is None or p > q:
                 continue
             a, b = sum(faces[first]) - p - q, sum(faces[neighbour]) - p - q
-            if _in_circle(*points[[p, q, a, b]]):
+            corners = [p, q, a, b]
+            if _is_flipped(points[corners], heights[corners]):
                 faces[first], faces[neighbour] = (a, p, b), (b, q, a)
                 break
         else:
@@ -73,14 +85,25 @@ def without_slivers(points: Floats, triangles: Ints) -> Ints:
     return np.array(faces, dtype=np.int64)
 
 
-def _in_circle(p: Floats, q: Floats, a: Floats, b: Floats) -> bool:
-    """Whether b lies inside the circle of p, q, a, beyond pq, and the diagonal ab may be cut."""
+def _is_flipped(points: Floats, height: Floats) -> bool:
+    """Whether b of p, q, a, b lies in the circle of p, q, a, beyond pq, and ab may be cut.
+
+    On the circle it is whether ab is higher than pq where they cross.
+    """
+    p, q, a, b = points
     angles = []
     for corner in (a, b):
         to_p, to_q = p - corner, q - corner
         angles.append(abs(np.arctan2(cross(to_p, to_q), to_p @ to_q)))
-    is_convex = cross(b - p, a - p) > 0 and cross(a - q, b - q) > 0
-    return bool(is_convex and sum(angles) > np.pi * (1 + 1e-9))
+    if not (cross(b - p, a - p) > 0 and cross(a - q, b - q) > 0):
+        return False
+    excess = sum(angles) / np.pi - 1
+    if abs(excess) > _ON_CIRCLE:
+        return bool(excess > 0)
+    base = cross(q - p, b - a)
+    t, u = cross(a - p, b - a) / base, cross(a - p, q - p) / base
+    gain = (1 - u) * height[2] + u * height[3] - (1 - t) * height[0] - t * height[1]
+    return bool(gain > _ON_CIRCLE * np.linalg.norm(q - p))
 
 
 def self_crossing(polygon: Floats) -> tuple[int, int] | None:
