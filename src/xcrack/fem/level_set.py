@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Bools, Floats, Ints, lock
+from xcrack.base.arrays import Bools, Floats, Ints, at, lock
+from xcrack.base.errors import CoarseMeshError
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.placing_2d import ON_MESH
@@ -372,6 +373,7 @@ _AT = 1e-10  # share of a cell below which a psi on the crack is zero
 _STRAIGHT = 1e-6  # offset as a share of a cell, below which a front or a surface is straight
 _CHORDS = 12  # chords over which their offset is averaged
 _NO_CUT = 0.5  # error of phi as a share of a cell, from which on that is not cut by the crack
+_OFF_SURFACE = 0.3  # of an edge: bends leave .23 between its cut and the surface
 _PASSES = 12  # towards the mean square: leaves a thirtieth of the slowest part
 
 
@@ -389,6 +391,11 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     Returns
     -------
     LevelSet
+
+    Raises
+    ------
+    CoarseMeshError
+        A front lies closer than a cell before a face of its own crack.
     """
     size = _largest_cells(mesh, crack)
     band = reach + 2 * size
@@ -409,11 +416,25 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     shift = _surface_shift(mesh, phi, at_end, tree, distance_to)
     phi = snap_to_vertices(mesh, phi + shift)
     near_edge = near_edges(mesh, phi, shift)
+    if surface.faces is not None:
+        near_edge &= _is_cut_on_surface(mesh, phi, near_edge, tree)
     for k, front in enumerate(fronts):
         psi[k] = _shifted_psi(mesh, phi, psi[k], near_edge, front, band)
     tip_cells = tuple(_front_cells(mesh, phi, p, near_edge) for p in psi)
+    if surface.faces is not None:
+        _check_front_cells(fronts, tip_cells)
     x_front = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x_front), lock(mouth), lock(near_edge))
+
+
+def _check_front_cells(fronts: list[Front], tip_cells: tuple[Ints, ...]) -> None:
+    """Raise where cells do not tell a front from a face of its own crack."""
+    for front, cells in zip(fronts, tip_cells, strict=True):
+        if not len(cells):
+            raise CoarseMeshError(
+                f"the front at {at(front.x[len(front.x) // 2])} ends before a face of its own "
+                "crack, closer than a cell: refine the mesh there, or end the crack before."
+            )
 
 
 def with_far_sides(mesh: Mesh, crack: Crack, levels: "LevelSet", reach: float) -> "LevelSet":
@@ -514,6 +535,23 @@ def _distance_to_faces_first(
     rows = rows[is_first]
     phi[rows], triangle[rows], at_end[rows] = distance[is_first], face[is_first], False
     return phi, triangle, at_end
+
+
+def _is_cut_on_surface(mesh: Mesh, phi: Floats, near_edge: Bools, tree: TriangleTree) -> Bools:
+    """Edges on which phi is not zero away from the surface and its prolongation `(e,)`.
+
+    Between a front and a face of the same crack less than two cells before it, phi is the distance
+    to one of them at one end of an edge, and to the other at the other: its zero is no crack.
+    """
+    result = np.ones(len(mesh.edges), dtype=bool)
+    a, b = phi[mesh.edges].T
+    rows = np.nonzero(near_edge & (a * b < 0))[0]
+    t = (a[rows] / (a[rows] - b[rows]))[:, None]
+    start, stop = mesh.points[mesh.edges[rows]].transpose(1, 0, 2)
+    largest_offset = _OFF_SURFACE * mesh.edge_length[rows]
+    distance = closest_in(tree, (1 - t) * start + t * stop, float(largest_offset.max(initial=0.0)))
+    result[rows] = (distance.triangle >= 0) & (distance.distance <= largest_offset)
+    return result
 
 
 def _surface_shift(
