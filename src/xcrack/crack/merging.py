@@ -196,14 +196,14 @@ def merged_crack(
     flags = tuple(map(find_blocked, trees))
 
     if body is None:
-        return _with_gap_closed(both_cracks, facing_fronts, (), flags, radius, size)
+        return _with_gap_closed(both_cracks, facing_fronts, (), flags, radius, size, True)
 
     def close_gap(count: int) -> Crack:
         short_fronts = tuple(
             [_with_short_ends(f, count, body) for f in group] for group in facing_fronts
         )
         return _with_gap_closed(
-            both_cracks, (short_fronts[0], short_fronts[1]), (), flags, radius, size
+            both_cracks, (short_fronts[0], short_fronts[1]), (), flags, radius, size, True
         )
 
     return _first_that_closes(close_gap, facing_fronts)
@@ -641,8 +641,12 @@ def _with_gap_closed(
     blocked_by: tuple[Callable[[Front], Bools], ...],
     radius: float,
     size: float,
+    begins_far: bool = False,
 ) -> Crack:
-    """A crack with faces between those pieces of two groups of fronts that face each other."""
+    """A crack with faces between those pieces of two groups of fronts that face each other.
+
+    A new closed front begins at its lowest point number, or far from the gap.
+    """
     runs, other_runs = (
         [(front, run) for front in group for run in _runs(front, is_blocked(front))]
         for group, is_blocked in zip(pair, blocked_by)
@@ -667,7 +671,9 @@ def _with_gap_closed(
         left_points.append(crack.points[patch.used_faces])
         count += len(patch.points)
     x, gap_middle = np.concatenate(points), np.concatenate(left_points).mean(axis=0)
-    lines = [_with_start(line, all_fronts, x, gap_middle) for line in _chains(next_number)]
+    lines = _chains(next_number)
+    if begins_far:
+        lines = [_with_start(line, all_fronts, x, gap_middle) for line in lines]
     return Crack(x, np.concatenate(faces), None, tuple(lines))
 
 
