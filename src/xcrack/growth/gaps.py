@@ -148,7 +148,7 @@ def closing_annulus(
         in_cycles, in_radius = slopes(s - h / 2, b_middle)
         cycles, b = cycles + h * in_cycles, b + h * in_radius
     last_rate = outer_rate * (ratios(0.0, b)[1] / first_outer) ** exponent * growth_beside
-    return cycles, b - outer_radius, float(last_rate)
+    return float(cycles), float(b - outer_radius), float(last_rate)
 
 
 __all__ = [
