@@ -312,7 +312,7 @@ def test_ligaments_that_cells_do_not_resolve_are_named(tmp_path):
 def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
     """Both arms have the same K: the body is symmetric, its cells (1.9 a radius) are not.
 
-    They are 4.6 % apart in the step that touches the hole, .7 and 2.8 % after it.
+    They are 2.3 % apart in the step that touches the hole, .8 and .5 % after it.
     """
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, 0.25), h=0.13)
     ends = [xc.displacement("top", (0.0, 0.0, 1e-3)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
@@ -333,8 +333,8 @@ def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
             apart.append(abs(one - other) / (one + other) * 2)
     assert 2 in counts
     assert counts[-1] == 1
-    assert np.median(apart) < 0.04
-    assert max(apart) < 0.07
+    assert np.median(apart) < 0.02
+    assert max(apart) < 0.04
     joined = len(counts) - counts[::-1].index(2)
     (join,) = run.joins
     assert (join.step, join.cracks, join.N) == (joined, (0, 0), run.steps[joined].cycles)
@@ -355,11 +355,39 @@ def test_a_run_passes_a_hole_and_goes_on_where_it_was_stopped(tmp_path):
         assert path.read_bytes() == (part / path.name).read_bytes()
 
 
+@pytest.mark.parametrize("x", [-0.4, *slow(-0.45)])
+def test_both_arms_of_a_straight_front_across_a_hole_are_alike(tmp_path, x):
+    """Each is seen by the cells at it alone, and K is a mirror's: arms differ by the mesh.
+
+    The level set of one arm jumps behind the hole, where the strips ahead of both meet: that jump
+    was taken for its front, functions of one arm stood at the other, and half of that was not cut.
+    """
+    mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, 0.13), h=0.08)
+    ends = [xc.displacement("top", (0.0, 0.0, 1e-3)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
+    problem = xc.Problem(mesh, xc.Isotropic(E=210e3, nu=0.3), [through_crack(x)], supports=ends)
+    solution = xc.solve(problem)
+    mesh = solution.space.mesh
+    levels = solution.space.cuts[0].level_set
+    for tip, cells in zip(solution.space.tips, levels.tip_cells, strict=True):
+        away = np.abs(mesh.points[mesh.cells[cells]][..., 0] - x).min(axis=1)
+        assert (away <= mesh.cell_size[cells]).all()
+        side = np.sign(np.mean(tip.x, axis=0)[1])
+        assert (side * mesh.points[mesh.cells[cells]][..., 1]).max(axis=1).min() > 0
+    sif = xc.stress_intensity(solution)
+    grid, K = np.linspace(0.14, 0.6, 100), []
+    for k in range(2):
+        y, values = np.abs(sif.x[sif.front == k, 1]), sif.K_I[sif.front == k]
+        K.append(np.interp(grid, np.sort(y), values[np.argsort(y)]))
+    one, other = K
+    assert one.mean() == pytest.approx(other.mean(), rel=0.01)
+    assert np.sqrt(((one - other) ** 2).mean()) < 0.03 * one.mean()
+
+
 def test_K_beside_a_hole_smaller_than_a_cell_is_that_of_a_strip(tmp_path):
     """A straight front across a hole of half a cell: domains of both parts end at its middle.
 
     K is that of a long strip pulled apart (Rice, 1967), K² = E' G with the energy of the strip far
-    ahead, between plane stress (free sides) and plane strain. Beside the hole a tenth is left for
+    ahead, between plane stress (free sides) and plane strain. Beside the hole 11 % are left for
     the first place; domains that reached through the hole gave four times as much.
     """
     E, nu, pull, height = 210e3, 0.3, 1e-3, 0.6
@@ -375,7 +403,7 @@ def test_K_beside_a_hole_smaller_than_a_cell_is_that_of_a_strip(tmp_path):
     stress = E * np.sqrt(pull**2 / (2 * height) / (1 - nu**2))
     strain = E * np.sqrt((1 - nu) / (1 + nu) / (1 - 2 * nu) * pull**2 / (2 * height) / (1 - nu**2))
     assert stress < inner.mean() < strain
-    assert inner == pytest.approx(inner.mean(), rel=0.1)
+    assert inner == pytest.approx(inner.mean(), rel=0.12)
 
 
 def test_a_penny_opens_around_a_hole_and_leaves_the_block(tmp_path):

@@ -1,5 +1,6 @@
 """A smooth curve through the vertices of a crack front, with the frames along it."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -68,15 +69,16 @@ class FrontCurve:
     place, normal : (4, m, 3) arrays
         Coefficients of the pieces, highest power first.
     is_closed : bool
-    is_cut : (bool, bool)
-        Whether what lies beyond the first and the last vertex belongs to another front.
+    gaps : (float, float), length
+        From the first and the last vertex to where another front begins ahead of them: points
+        farther on belong to that. inf without one.
     """
 
     breaks: Floats
     place: Floats
     normal: Floats
     is_closed: bool
-    is_cut: tuple[bool, bool] = (False, False)
+    gaps: tuple[float, float] = (np.inf, np.inf)
 
     @property
     def length(self) -> float:
@@ -89,6 +91,12 @@ class FrontCurve:
         share = np.arange(n_parts) / n_parts
         s = (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * share).ravel()
         s = np.append(s, self.breaks[-1])
+        step = float(np.diff(s).max())
+        before, behind = (
+            step * np.arange(1, 1 + math.ceil(gap / step)) if 0 < gap < np.inf else np.empty(0)
+            for gap in self.gaps
+        )
+        s = np.concatenate([-before[::-1], s, self.length + behind])
         return s, self.at(s)[0]
 
     def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:
@@ -138,7 +146,7 @@ class FrontCurve:
         Returns
         -------
         rows : (k,) array of int
-            Which points; without those beyond ends that are cut.
+            Which points; without those beyond gaps.
         feet : FootPoints
             Theirs.
         """
@@ -152,11 +160,9 @@ class FrontCurve:
         picked = np.ascontiguousarray(x[rows], dtype=float)
         curve = (self.breaks, self.place, self.normal, self.is_closed)
         points = FootPoints(*feet(picked, s[sample[rows]], 2 * step, *curve))
-        if not any(self.is_cut):
+        is_on_front = (points.s > -self.gaps[0]) & (points.s < self.length + self.gaps[1])
+        if is_on_front.all():
             return rows, points
-        is_on_front = ~(
-            (self.is_cut[0] & (points.s < 0)) | (self.is_cut[1] & (points.s > self.length))
-        )
         return rows[is_on_front], points.subset(is_on_front)
 
     def distance(self, x: Floats, bound: float = np.inf) -> Floats:

@@ -374,6 +374,7 @@ _STRAIGHT = 1e-6  # offset as a share of a cell, below which a front or a surfac
 _CHORDS = 12  # chords over which their offset is averaged
 _NO_CUT = 0.5  # error of phi as a share of a cell, from which on that is not cut by the crack
 _OFF_SURFACE = 0.3  # of an edge: bends leave .23 between its cut and the surface
+_LONGEST = 1.5  # cells; no distance changes more within one
 _PASSES = 12  # towards the mean square: leaves a thirtieth of the slowest part
 
 
@@ -665,7 +666,9 @@ def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints
     levels = np.where(np.abs(levels) < _AT * mesh.cell_size[rows][:, None], 0.0, levels)
     psi_min = np.where(np.isnan(levels), np.inf, levels).min(axis=1)
     psi_max = np.where(np.isnan(levels), -np.inf, levels).max(axis=1)
-    return rows[is_close & (psi_min <= 0) & (psi_max >= 0)]
+    # Where strips of two fronts meet, psi of each changes its sign away from its front: it jumps.
+    is_front = psi_max - psi_min <= _LONGEST * mesh.cell_size[rows]
+    return rows[is_close & is_front & (psi_min <= 0) & (psi_max >= 0)]
 
 
 __all__ = []

@@ -13,7 +13,8 @@ from xcrack.base.errors import warn
 from xcrack.base.machine import stream_tasks
 from xcrack.crack.front_curve import FootPoints, FrontCurve
 from xcrack.crack.junctions_3d import are_opposite
-from xcrack.crack.stations import front_in_body, inside_body
+from xcrack.crack.stations import FrontInBody, front_in_body, inside_body
+from xcrack.fem.function_space import Tip
 from xcrack.fem.loads import position
 from xcrack.fem.quadrature import cell_points, cell_side, lip_side
 from xcrack.mesh.distances import closest_in, triangle_tree
@@ -53,7 +54,8 @@ _OUTER = 2.6  # wanted outer radius, in legs of the cells at the front
 # Outer radius in radii of the enriched tube: the error sits in the cells at its rim, and a domain
 # that reaches beyond them makes K of a penny 1 % too low.
 _REACH = 1.05
-_BESIDE = 1.5  # wanted radii from the end of a front within which another one goes on
+_BESIDE = 3.0  # wanted radii from the end of a front within which another one goes on
+_SAMPLES = 101  # of a front, among which what is nearest to the end of another one is looked for
 _AHEAD = 0.7  # cosine to the front's direction at its end, in which it does
 _BENT = 0.9  # largest outer radius, as a share of the radius of curvature of the front
 _LEAST = 0.8  # legs; the radius of the smallest domain
@@ -122,12 +124,9 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     """
     space = solutions[0].space
     tip = space.tips[t]
-    number = space.cracks[tip.crack].fronts or ()
-    is_closed = bool(number[tip.number][0] == number[tip.number][-1])
-    part = front_in_body(
-        tip.x, tip.frame, is_closed, partial(inside_body, space.cracks, tip.crack, space.mesh)
-    )
-    curve = replace(part.curve, is_cut=_cut_ends(solutions[0], t, part.curve))
+    part = _part_in_body(solutions[0], tip)
+    is_closed = part.curve.is_closed
+    curve = replace(part.curve, gaps=_gaps(solutions[0], t, part))
     s, ends = part.at, part.ends
     nothing = np.zeros(len(s))
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
@@ -195,28 +194,49 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     return result
 
 
-def _cut_ends(solution: Solution, t: int, curve: FrontCurve) -> tuple[bool, bool]:
-    """Ends of a front beyond which its crack has another, or its own other end, behind a hole.
+def _gaps(solution: Solution, t: int, part: FrontInBody) -> tuple[float, float]:
+    """Gaps between the ends of a front and what its crack has behind a hole, as `FrontCurve.gaps`.
 
-    Domains would reach through a hole that is smaller than they are.
+    That is another front, or its own other end. Domains would reach through a hole that is smaller
+    than they are; a plane that cuts them off in the body beside the hole would leave out what acts
+    there, so that hats fall to zero over the gap. Over less than a cell that is too steep: 0 there.
     """
-    if curve.is_closed:
-        return False, False
+    curve, ends = part.curve, part.ends
+    if curve.is_closed or ends is None:
+        return np.inf, np.inf
     space = solution.space
     tip = space.tips[t]
-    radius = _wanted_radius(solution, t)
-    x, frame, _ = curve.at(np.array([0.0, curve.length]))
-    other_ends = [
-        np.array(f.x) for f in space.tips if f.crack == tip.crack and f.number != tip.number
-    ]
+    x, frame, _ = curve.at(np.array(ends))
+    overhang = np.array([ends[0], curve.length - ends[1]])
+    size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
+    reach = _BESIDE * _wanted_radius(solution, t) + overhang
+    others = []
+    for other in space.tips:
+        if other.crack == tip.crack and other.number != tip.number:
+            outside = np.maximum(np.min(other.x, axis=0) - x, x - np.max(other.x, axis=0))
+            if (np.linalg.norm(np.maximum(outside, 0.0), axis=1) < reach).any():
+                of_other = _part_in_body(solution, other)
+                if of_other.ends is not None:
+                    others.append(of_other.curve.at(np.linspace(*of_other.ends, _SAMPLES))[0])
     result = []
     for e, sign in ((0, -1.0), (1, 1.0)):
-        ways = np.concatenate([*other_ends, x[[1 - e]]]) - x[e]
+        ways = np.concatenate([*others, x[[1 - e]]]) - x[e]
         distance = np.linalg.norm(ways, axis=1)
         distance_ahead = sign * (ways @ frame[e, 2])
-        is_close = (distance < _BESIDE * radius) & (distance_ahead >= _AHEAD * distance)
-        result.append(bool(is_close.any()))
+        is_ahead = (distance < reach[e]) & (distance_ahead >= _AHEAD * distance)
+        nearest = distance_ahead[is_ahead].min(initial=np.inf)
+        gap = max(float(nearest - overhang[e]), _ON * curve.length)
+        result.append(gap if nearest >= size else 0.0)
     return result[0], result[1]
+
+
+def _part_in_body(solution: Solution, tip: Tip) -> FrontInBody:
+    """The part of a front that lies in the body."""
+    cracks = solution.space.cracks
+    number = cracks[tip.crack].fronts or ()
+    is_closed = bool(number[tip.number][0] == number[tip.number][-1])
+    is_inside = partial(inside_body, cracks, tip.crack, solution.space.mesh)
+    return front_in_body(tip.x, tip.frame, is_closed, is_inside)
 
 
 def _wanted_radius(solution: Solution, t: int) -> float:
@@ -302,24 +322,25 @@ def front_values(
     at_planes = (False, False) if curve.is_closed else _ends_at_planes(ends, sides, size)
     knots = front_nodes(curve, _spacing(curve, ends, size, at_planes), ends, sum(at_planes))
     room = _room(solutions[0], t, curve, knots, size)
-    room_at_sides = (
-        np.full(len(knots), np.inf) if sides is None else room_beside(sides, curve, knots)
-    )
+    tops, is_on_front = _with_gaps(knots, curve)
+    room_at_sides = np.full(len(knots), np.inf)
     is_smooth = np.zeros(len(knots), dtype=bool)
     if sides is not None:
-        is_smooth = on_smooth_planes(sides, curve, knots)
+        room_at_sides = room_beside(sides, curve, tops)[is_on_front]
+        is_smooth = on_smooth_planes(sides, curve, tops)[is_on_front]
     is_valid = room_at_sides > _LEAST * size
     room = np.where(is_valid, np.minimum(room, room_at_sides), room)
     radius = np.clip(room, _LEAST * size, target_radius)
-    radii = radius[:, None] * np.array([1.0, SECOND])
+    radii = np.interp(tops, knots, radius)[:, None] * np.array([1.0, SECOND])
     r_outer = float(radius.max())
     distance = curve.distance(space.mesh.points, r_outer)
     turn = np.stack([mean_rotation(s, distance, r_outer) for s in solutions], axis=-1)
-    total = _lip_part(solutions, t, curve, knots, radii, turn, materials)
+    total = _lip_part(solutions, t, curve, tops, radii, turn, materials)
     if sides is not None:
-        total += integrals_of_sides(solutions, t, sides, curve, knots, radii, turn, materials)
-    for part in _domain_parts(solutions, t, curve, knots, radii, turn, materials):
+        total += integrals_of_sides(solutions, t, sides, curve, tops, radii, turn, materials)
+    for part in _domain_parts(solutions, t, curve, tops, radii, turn, materials):
         total += part
+    total = np.ascontiguousarray(total[..., is_on_front])
     scene = knots, curve, tip_material
     K = solve_front(total, *scene, is_valid, is_smooth, materials.modulus_ratio)
     wide_K = twice_as_wide(total, *scene, is_valid, is_smooth, materials.modulus_ratio)
@@ -344,6 +365,16 @@ def front_values(
         ),
     )
     return FrontValues(knots, K, mean, is_valid, wide_K, is_smooth, radius, domain)
+
+
+def _with_gaps(knots: Floats, curve: FrontCurve) -> tuple[Floats, Bools]:
+    """Tops of the hats, with those where gaps end, to which the last hats fall; which are not."""
+    first, last = -curve.gaps[0], curve.length + curve.gaps[1]
+    tops = np.concatenate([[first], knots, [last]])
+    is_on_front = (tops >= knots[0]) & (tops <= knots[-1])
+    counts = np.isfinite(tops)
+    counts[[0, -1]] &= np.array(curve.gaps) > 0
+    return tops[counts], is_on_front[counts]
 
 
 def _distance_to_interface(solution: Solution, x: Floats) -> float:
