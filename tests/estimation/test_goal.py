@@ -101,5 +101,5 @@ def test_ends_of_zones_that_slip():
                 K.append([g.of(replace(solution, u=x), *at_points) for g in goals])
             changes.append(np.abs(K[1] - np.array(K[0])).ravel())
         wanted = wanted + 1 / (1 / changes[0] + 1 / changes[1])
-    found = rubbing_end_changes(factored, goals, [0])[0]
-    np.testing.assert_allclose(found, wanted, rtol=1e-7)
+    changes_of_K = rubbing_end_changes(factored, goals, [0])[0]
+    np.testing.assert_allclose(changes_of_K, wanted, rtol=1e-7)

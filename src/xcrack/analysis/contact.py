@@ -81,11 +81,11 @@ class ContactSolution:
     dual : (g, g) array or None
         F = N K^-1 N^T over the multipliers of all cracks in their order; None where no
         factorisation made it.
-    rubbing : tuple of FrictionWork
+    friction_work : tuple of FrictionWork
         Of the cracks whose faces rub.
     dissipated : tuple of float
         Energy that friction took in each state since the one before; empty without.
-    rubbing : RubbingStates or None
+    rubbing_states : RubbingStates or None
         In 2D with friction.
     """
 
@@ -97,7 +97,7 @@ class ContactSolution:
     dual: Floats | None = None
     friction_work: tuple[FrictionWork, ...] = ()
     dissipated: tuple[float, ...] = ()
-    rubbing: RubbingStates | None = None
+    rubbing_states: RubbingStates | None = None
 
     def closed_sets(self) -> SolverState:
         """Closed sets by place, for the next solve."""
@@ -201,7 +201,7 @@ def solve_contact(
             sets,
             friction_work=tuple(friction_solution.work),
             dissipated=friction_solution.dissipated,
-            rubbing=friction_solution.rubbing,
+            rubbing_states=friction_solution.rubbing_states,
         )
     for c in expected_cracks:
         closed_groups = closed_sets[c]

@@ -379,13 +379,13 @@ class FrictionSolution:
     Attributes
     ----------
     states : list of StateContact
-    rubbing : list of FrictionWork
+    friction_work : list of FrictionWork
         One for each crack with friction and multipliers.
     dissipated : tuple of float
         Energy since the state before.
     motion_between : (n_dof, k) array, length
         Displacements of the substeps; none where nobody asked.
-    rubbing : RubbingStates or None
+    rubbing_states : RubbingStates or None
         None in 3D, and for an alternative to multipliers.
     """
 
@@ -393,7 +393,7 @@ class FrictionSolution:
     work: list[FrictionWork]
     dissipated: tuple[float, ...]
     motion_between: Floats
-    rubbing: RubbingStates | None = None
+    rubbing_states: RubbingStates | None = None
 
 
 def has_friction(problem: Problem, c: int) -> bool:

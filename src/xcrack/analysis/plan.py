@@ -162,8 +162,8 @@ def takes_iterations(problem: Problem, n: int) -> bool:
     linear_solver = problem.numerics.linear
     if linear_solver != "auto":
         return linear_solver == "iterative"
-    most = _DIRECT_WITH_FRICTION if _may_rub(problem) else _DIRECT[problem.order or 1]
-    is_large = problem.mesh.dim == 3 and n > most
+    n_direct = _DIRECT_WITH_FRICTION if _may_rub(problem) else _DIRECT[problem.order or 1]
+    is_large = problem.mesh.dim == 3 and n > n_direct
     if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
         return False  # quadratic functions of both cracks nearly vanish together beside a junction
     return is_large and problem.numerics.contact_method is None  # others change the matrix

@@ -378,10 +378,10 @@ def _advanced_points(
         return None
     is_vertex = np.zeros(len(start), dtype=bool)
     is_vertex[vertex] = True
-    is_kept = is_vertex | ~is_at_rest
-    number = np.cumsum(is_kept) - 1
-    rays = chain(start[is_kept], stop[is_kept], is_at_rest[is_kept], is_closed)
-    return rays, number[np.array(vertex)], new_normal[is_kept]
+    has_ray = is_vertex | ~is_at_rest
+    number = np.cumsum(has_ray) - 1
+    rays = chain(start[has_ray], stop[has_ray], is_at_rest[has_ray], is_closed)
+    return rays, number[np.array(vertex)], new_normal[has_ray]
 
 
 def _frames(front: Front) -> Floats:

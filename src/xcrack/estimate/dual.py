@@ -334,25 +334,25 @@ def rubbing_end_changes(
         Their functionals one after the other in m.
     states : sequence of int
     """
-    rubbing, motion = factored.contact.rubbing, factored.motion
+    rubbing_states, motion = factored.contact.rubbing_states, factored.motion
     total = np.zeros((len(states), sum(goal.m for goal in goals)))
-    if rubbing is None:
+    if rubbing_states is None:
         return total
     f = np.concatenate([goal.on_functions(factored.model.space) for goal in goals], axis=1)
     z = factored.engine.solve(f - motion.modes @ (motion.modes.T @ f))
     crack, position, piece = (np.concatenate(part) for part in zip(*_places(factored), strict=True))
-    rows = rubbing.rows
+    rows = rubbing_states.rows
     of_pressure = _on_groups(factored, crack, goals, Goal.on_pressures)
     of_shear = _on_groups(factored, crack, goals, Goal.on_shears)[rows.rubbing_rows]
-    per_traction = rubbing.N @ z + np.concatenate([of_pressure, of_shear])
+    per_traction = rubbing_states.N @ z + np.concatenate([of_pressure, of_shear])
     order = np.lexsort((position, crack))
     same_piece = (np.diff(crack[order]) == 0) & (np.diff(piece[order]) == 0)
     for row, k in enumerate(states):
         slip = np.zeros(rows.n, dtype=np.int64)
-        slip[rows.rubbing_rows] = rubbing.status[k].slip
-        is_closed = rubbing.status[k].is_closed
+        slip[rows.rubbing_rows] = rubbing_states.status[k].slip
+        is_closed = rubbing_states.status[k].is_closed
         status = np.where(is_closed, slip, 2)
-        tractions = of_status(rows, rubbing.change[k], rubbing.status[k])[0]
+        tractions = of_status(rows, rubbing_states.change[k], rubbing_states.status[k])[0]
         ends = np.nonzero((np.diff(status[order]) != 0) & same_piece)[0]
         for pair in (order[end : end + 2] for end in ends):
             changes = []
@@ -360,7 +360,7 @@ def rubbing_end_changes(
                 closed_then, slip_then = is_closed.copy(), slip.copy()
                 closed_then[group], slip_then[group] = is_closed[neighbour], slip[neighbour]
                 status_then = Status(closed_then, slip_then[rows.rubbing_rows])
-                tractions_then = of_status(rows, rubbing.change[k], status_then)[0]
+                tractions_then = of_status(rows, rubbing_states.change[k], status_then)[0]
                 changes.append(np.abs(per_traction.T @ (tractions_then - tractions)))
             change_sum = changes[0] + changes[1]
             total[row] += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)

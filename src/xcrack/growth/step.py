@@ -147,8 +147,8 @@ def numbers_after(n: int, joins_of_step: Sequence[Join], n_left: int) -> list[in
     """
     number = list(range(n))
     for join in joins_of_step[len(joins_of_step) - (n - n_left) :]:
-        kept_number, lost_number = sorted(number[c] for c in join.cracks)
-        number = [kept_number if c == lost_number else c - (c > lost_number) for c in number]
+        first_number, second_number = sorted(number[c] for c in join.cracks)
+        number = [first_number if c == second_number else c - (c > second_number) for c in number]
     return number
 
 

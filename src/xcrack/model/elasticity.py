@@ -6,7 +6,7 @@ integrated exactly by any rule of one degree more, and entries of standard and o
 functions, which come from other points, would else not make a positive matrix.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import combinations
@@ -206,11 +206,11 @@ class Elasticity:
 
     def stress(self, gradient: Floats, cell: Ints, bary: Floats) -> Floats:
         """Stress `(q, d, d)` of displacement gradients at points given by cell."""
-        return self._by_material("stress", gradient, cell, bary)
+        return self._by_material(lambda material: material.stress, gradient, cell, bary)
 
     def strain(self, stress: Floats, cell: Ints, bary: Floats) -> Floats:
         """Strain `(q, d, d)` of stresses at points given by cell."""
-        return self._by_material("strain", stress, cell, bary)
+        return self._by_material(lambda material: material.strain, stress, cell, bary)
 
     def stress_across(self, stress: Floats, cell: Ints, bary: Floats) -> Floats:
         """Stress across the plane `(q,)` of a plane body, from that in it `(q, 2, 2)`."""
@@ -365,12 +365,18 @@ class Elasticity:
                 result[rows[part], :, :, n] = change
         return result
 
-    def _by_material(self, law: str, tensor: Floats, cell: Ints, bary: Floats) -> Floats:
+    def _by_material(
+        self,
+        response_of: Callable[[Material], Callable[[Floats], Floats]],
+        tensor: Floats,
+        cell: Ints,
+        bary: Floats,
+    ) -> Floats:
         if self.is_uniform:
-            return np.asarray(getattr(self.materials[0], law)(tensor))
+            return np.asarray(response_of(self.materials[0])(tensor))
         result = np.empty_like(tensor)
         for rows, material in self.at_points(cell, bary):
-            result[rows] = getattr(material, law)(tensor[rows])
+            result[rows] = response_of(material)(tensor[rows])
         return result
 
 

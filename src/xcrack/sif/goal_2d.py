@@ -145,7 +145,7 @@ def _faces(
     xi = way[near_points] @ R.T
     xi[np.abs(xi[:, 1]) < _STRAIGHT * r_outer, 1] = 0.0
     is_bent = bool(xi[:, 1].any())
-    along = tangents(lips)[near_points, 0] @ R.T
+    lip_tangents = tangents(lips)[near_points, 0] @ R.T
     parts = []
     for s, sign in ((0, -1), (1, 1)):
         cell, bary = lips.cell[near_points, s], lips.bary[near_points, s]
@@ -157,7 +157,7 @@ def _faces(
         factor = np.zeros((len(near_points), 2, 2, 2))
         for m, g in enumerate(unit_gradients(r, theta, tip_material.kolosov, tip_material.mu)[:2]):
             pressure[near_points, m] += w * np.einsum("qi,qi->q", outward_normal, g[:, :, 0])
-            shear[near_points, m] -= sign * w * np.einsum("qi,qi->q", along, g[:, :, 0])
+            shear[near_points, m] -= sign * w * np.einsum("qi,qi->q", lip_tangents, g[:, :, 0])
             if not is_bent:
                 continue
             sigma = tip_material.stress(g)
