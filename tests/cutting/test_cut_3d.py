@@ -236,5 +236,5 @@ def test_no_crack_between_a_front_and_its_own_face(turn, gap):
 def test_a_front_less_than_a_cell_before_its_own_face_is_refused():
     """K of it was a foreign error: no cell held the front."""
     size = np.array((18, 5, 11)) / 15
-    with pytest.raises(xc.CoarseMeshError, match="a face of its own crack, closer than a cell"):
+    with pytest.raises(xc.GeometryError, match="a face of its own crack, closer than a cell"):
         model(xc.box(-size, size, (18, 5, 11)), bent_back(90, 0.1))
