@@ -92,11 +92,11 @@ class FrontCurve:
         s = (self.breaks[:-1, None] + np.diff(self.breaks)[:, None] * share).ravel()
         s = np.append(s, self.breaks[-1])
         step = float(np.diff(s).max())
-        before, behind = (
+        s_before, s_behind = (
             step * np.arange(1, 1 + math.ceil(gap / step)) if 0 < gap < np.inf else np.empty(0)
             for gap in self.gaps
         )
-        s = np.concatenate([-before[::-1], s, self.length + behind])
+        s = np.concatenate([-s_before[::-1], s, self.length + s_behind])
         return s, self.at(s)[0]
 
     def at(self, s: Floats) -> tuple[Floats, Floats, Floats]:

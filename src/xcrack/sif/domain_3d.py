@@ -210,23 +210,23 @@ def _gaps(solution: Solution, t: int, part: FrontInBody) -> tuple[float, float]:
     overhang = np.array([ends[0], curve.length - ends[1]])
     size = leg_size(space.mesh, space.cuts[tip.crack].level_set.tip_cells[tip.number])
     reach = _BESIDE * _wanted_radius(solution, t) + overhang
-    others = []
-    for other in space.tips:
-        if other.crack == tip.crack and other.number != tip.number:
-            outside = np.maximum(np.min(other.x, axis=0) - x, x - np.max(other.x, axis=0))
-            if (np.linalg.norm(np.maximum(outside, 0.0), axis=1) < reach).any():
-                of_other = _part_in_body(solution, other)
+    x_others = []
+    for other_tip in space.tips:
+        if other_tip.crack == tip.crack and other_tip.number != tip.number:
+            box_gap = np.maximum(np.min(other_tip.x, axis=0) - x, x - np.max(other_tip.x, axis=0))
+            if (np.linalg.norm(np.maximum(box_gap, 0.0), axis=1) < reach).any():
+                of_other = _part_in_body(solution, other_tip)
                 if of_other.ends is not None:
-                    others.append(of_other.curve.at(np.linspace(*of_other.ends, _SAMPLES))[0])
+                    x_others.append(of_other.curve.at(np.linspace(*of_other.ends, _SAMPLES))[0])
     result = []
     for e, sign in ((0, -1.0), (1, 1.0)):
-        ways = np.concatenate([*others, x[[1 - e]]]) - x[e]
+        ways = np.concatenate([*x_others, x[[1 - e]]]) - x[e]
         distance = np.linalg.norm(ways, axis=1)
         distance_ahead = sign * (ways @ frame[e, 2])
         is_ahead = (distance < reach[e]) & (distance_ahead >= _AHEAD * distance)
-        nearest = distance_ahead[is_ahead].min(initial=np.inf)
-        gap = max(float(nearest - overhang[e]), _ON * curve.length)
-        result.append(gap if nearest >= size else 0.0)
+        nearest_way = distance_ahead[is_ahead].min(initial=np.inf)
+        gap = max(float(nearest_way - overhang[e]), _ON * curve.length)
+        result.append(gap if nearest_way >= size else 0.0)
     return result[0], result[1]
 
 
@@ -369,8 +369,8 @@ def front_values(
 
 def _with_gaps(knots: Floats, curve: FrontCurve) -> tuple[Floats, Bools]:
     """Tops of the hats, with those where gaps end, to which the last hats fall; which are not."""
-    first, last = -curve.gaps[0], curve.length + curve.gaps[1]
-    tops = np.concatenate([[first], knots, [last]])
+    s_first, s_last = -curve.gaps[0], curve.length + curve.gaps[1]
+    tops = np.concatenate([[s_first], knots, [s_last]])
     is_on_front = (tops >= knots[0]) & (tops <= knots[-1])
     counts = np.isfinite(tops)
     counts[[0, -1]] &= np.array(curve.gaps) > 0
