@@ -375,7 +375,7 @@ def test_a_run_goes_on_with_the_order_it_began_with(tmp_path):
 
 
 def test_faces_that_rub_in_space_have_order_1():
-    """Order 2 takes 3 to 10 times as long there, and K_II is no better (docs/measured.md)."""
+    """Order 2 takes up to 3.5 times as long there, twenty times by iteration (docs/measured.md)."""
     assert block(friction=0.3).order == 1
     assert block(friction=[0.3]).order == 1
     assert block(friction=0.3, order=2).order == 2
