@@ -80,8 +80,8 @@ def test_ends_of_zones_that_slip():
     """What a group more and one less do to K is what a solution with such zones has."""
     solution = rubbed(ARC, 17)
     factored = solution.factored
-    rubbing = factored.contact.rubbing
-    rows, status = rubbing.rows, rubbing.status[0]
+    rubbing_states = factored.contact.rubbing_states
+    rows, status = rubbing_states.rows, rubbing_states.status[0]
     states = np.where(status.is_closed, status.slip, 2)  # positions rise with the groups here
     ends = np.nonzero(np.diff(states))[0]
     assert len(ends)
@@ -92,9 +92,9 @@ def test_ends_of_zones_that_slip():
         for group, neighbour in ((end, end + 1), (end + 1, end)):
             is_closed, slip = status.is_closed.copy(), status.slip.copy()
             is_closed[group], slip[group] = is_closed[neighbour], slip[neighbour]
-            then = of_status(rows, rubbing.change[0], Status(is_closed, slip))[0]
-            tractions = of_status(rows, rubbing.change[0], status)[0]
-            u = solution.u + factored.engine.solve(rubbing.N.T @ (then - tractions))
+            then = of_status(rows, rubbing_states.change[0], Status(is_closed, slip))[0]
+            tractions = of_status(rows, rubbing_states.change[0], status)[0]
+            u = solution.u + factored.engine.solve(rubbing_states.N.T @ (then - tractions))
             K = []
             for x, y in ((solution.u, tractions), (u, then)):
                 at_points = [factored.contact.spaces[0].values @ part for part in np.split(y, 2)]

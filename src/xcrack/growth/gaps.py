@@ -121,7 +121,7 @@ def closing_annulus(
     --------
     >>> cycles, advance, rate = closing_annulus(0.05, 1.0, (1e-3, 1e-4), 3.0)
     >>> print(round(cycles * 1e-3 / 0.05, 3), round(advance, 4))
-    0.405 0.0021
+    0.404 0.0021
     """
     inner_rate, outer_rate = rates
 
