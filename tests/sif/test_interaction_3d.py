@@ -91,6 +91,22 @@ def test_penny_at_any_radius(radius):
     assert np.abs(result - expected).max() < 1e-4 * np.abs(expected).max()
 
 
+def test_a_point_at_the_centre_of_curvature_is_no_K():
+    """The metric is zero there: K of a bent front was -2600 for 80 by a single point."""
+    curve = ellipse_front(1.0, 1.0, 64)
+    knots = front_nodes(curve, even(0.5))
+    radii, side = np.full((len(knots), 1), 1.5), np.ones(1, dtype=int)
+    largest = []
+    for away in (0.1, 1e-3, 1e-5):
+        x = curve.at(knots[:1])[0] * away + np.array([0.0, 0.0, 1e-9])
+        total = domain_integrals(
+            curve, knots, curve.feet(x), np.ones(1), np.eye(3)[None, :, :, None], side,
+            np.ones(1, dtype=bool), STEEL, radii,
+        )  # fmt: skip
+        largest.append(np.abs(total).max())
+    assert max(largest) < 2 * largest[0]
+
+
 @pytest.mark.parametrize(("radius", "error"), [(0.05, 0.0087), (0.2, 0.0348), (0.4, 0.0708)])
 def test_penny_without_the_terms_of_curvature(radius, error):
     # The numbers of the prototype: K_I of the formula of a straight front is that much too large.

@@ -6,6 +6,10 @@ import numpy as np
 
 from xcrack.base.kernels.jit import kernel
 
+# Of the length along b for a unit of arc: it is zero at the centre of curvature of a front, where a
+# single point of integration made K a hundred times too large.
+_LEAST_METRIC = 0.1
+
 
 @kernel
 def _piece_of(s, break_arcs, guess):  # type: ignore[no-untyped-def]
@@ -318,7 +322,7 @@ def front_terms(  # type: ignore[no-untyped-def]
         kt, kn, w = turn[q, 0], turn[q, 1], turn[q, 2]
         if not is_curved:
             kt = kn = w = 0.0
-        per_hs = 1.0 / (1.0 - r * (kt * c + kn * s))
+        per_hs = 1.0 / max(1.0 - r * (kt * c + kn * s), _LEAST_METRIC)
         for side in range(2):
             part = share[q] if side == 1 else 1.0 - share[q]
             rise = step[q] if side == 1 else -step[q]
