@@ -379,7 +379,7 @@ class FrictionSolution:
     Attributes
     ----------
     states : list of StateContact
-    friction_work : list of FrictionWork
+    work : list of FrictionWork
         One for each crack with friction and multipliers.
     dissipated : tuple of float
         Energy since the state before.

@@ -296,27 +296,41 @@ def end_changes(groups: GoalGroups, duals: DualSolutions, gap: Floats, k: int) -
         State.
     """
     is_active, pressure = groups.active[k], groups.pressure[:, k]
-    total = np.zeros(duals.per_pressure.shape[1])
-    if not is_active.any():
-        return total
     gap_without_group = gap - groups.dual @ pressure
-    order = np.lexsort((groups.position, groups.crack))
-    is_active_in_order, crack, piece = is_active[order], groups.crack[order], groups.piece[order]
-    same_piece = (crack[1:] == crack[:-1]) & (piece[1:] == piece[:-1])
-    ends = np.nonzero((is_active_in_order[1:] != is_active_in_order[:-1]) & same_piece)[0]
-    for end in ends:
-        changes = []
-        for group in (order[end], order[end + 1]):
-            is_active_then = is_active.copy()
-            is_active_then[group] = ~is_active_then[group]
-            pressure_change = of_set(groups.dual, gap_without_group, is_active_then)[0] - pressure
-            changes.append(np.abs(duals.per_pressure.T @ pressure_change))
-        change_sum = changes[0] + changes[1]
-        total += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)
+
+    def change_with(group: int, neighbour: int) -> Floats:
+        is_active_then = is_active.copy()
+        is_active_then[group] = is_active[neighbour]
+        pressure_change = of_set(groups.dual, gap_without_group, is_active_then)[0] - pressure
+        return np.asarray(duals.per_pressure.T @ pressure_change)
+
+    place = groups.crack, groups.position, groups.piece
+    return _sum_at_ends(is_active, place, change_with, duals.per_pressure.shape[1])
+
+
+def _sum_at_ends(
+    status: Ints | Bools,
+    place: tuple[Ints, Floats, Ints],
+    change_with: Callable[[int, int], Floats],
+    m: int,
+) -> Floats:
+    """1 / (1/|a| + 1/|b|) over neighbours of other status on one piece of a crack `(m,)`.
+
+    a is the change if one takes the status of the other, b if the other takes that of the one.
+    """
+    crack, position, piece = place
+    order, total = np.lexsort((position, crack)), np.zeros(m)
+    same_piece = (np.diff(crack[order]) == 0) & (np.diff(piece[order]) == 0)
+    for end in np.nonzero((status[order][1:] != status[order][:-1]) & same_piece)[0]:
+        pair = order[end], order[end + 1]
+        change, opposite_change = np.abs(change_with(*pair)), np.abs(change_with(*pair[::-1]))
+        change_sum = change + opposite_change
+        total += change * opposite_change / np.where(change_sum > 0, change_sum, 1.0)
     return total
 
 
-# With friction a function may stick, slip either way, or be open.
+# With friction a function may stick (0), slip either way (-1, 1), or be open.
+_OPEN = 2
 
 
 def rubbing_end_changes(
@@ -335,36 +349,32 @@ def rubbing_end_changes(
     states : sequence of int
     """
     rubbing_states, motion = factored.contact.rubbing_states, factored.motion
-    total = np.zeros((len(states), sum(goal.m for goal in goals)))
     if rubbing_states is None:
-        return total
+        return np.zeros((len(states), sum(goal.m for goal in goals)))
     f = np.concatenate([goal.on_functions(factored.model.space) for goal in goals], axis=1)
     z = factored.engine.solve(f - motion.modes @ (motion.modes.T @ f))
     crack, position, piece = (np.concatenate(part) for part in zip(*_places(factored), strict=True))
-    rows = rubbing_states.rows
+    rows, change = rubbing_states.rows, rubbing_states.change
     of_pressure = _on_groups(factored, crack, goals, Goal.on_pressures)
     of_shear = _on_groups(factored, crack, goals, Goal.on_shears)[rows.rubbing_rows]
     per_traction = rubbing_states.N @ z + np.concatenate([of_pressure, of_shear])
-    order = np.lexsort((position, crack))
-    same_piece = (np.diff(crack[order]) == 0) & (np.diff(piece[order]) == 0)
-    for row, k in enumerate(states):
+
+    def of_state(k: int) -> Floats:
         slip = np.zeros(rows.n, dtype=np.int64)
         slip[rows.rubbing_rows] = rubbing_states.status[k].slip
-        is_closed = rubbing_states.status[k].is_closed
-        status = np.where(is_closed, slip, 2)
-        tractions = of_status(rows, rubbing_states.change[k], rubbing_states.status[k])[0]
-        ends = np.nonzero((np.diff(status[order]) != 0) & same_piece)[0]
-        for pair in (order[end : end + 2] for end in ends):
-            changes = []
-            for group, neighbour in (pair, pair[::-1]):
-                closed_then, slip_then = is_closed.copy(), slip.copy()
-                closed_then[group], slip_then[group] = is_closed[neighbour], slip[neighbour]
-                status_then = Status(closed_then, slip_then[rows.rubbing_rows])
-                tractions_then = of_status(rows, rubbing_states.change[k], status_then)[0]
-                changes.append(np.abs(per_traction.T @ (tractions_then - tractions)))
-            change_sum = changes[0] + changes[1]
-            total[row] += changes[0] * changes[1] / np.where(change_sum > 0, change_sum, 1.0)
-    return total
+        status = np.where(rubbing_states.status[k].is_closed, slip, _OPEN)
+        tractions = of_status(rows, change[k], rubbing_states.status[k])[0]
+
+        def change_with(group: int, neighbour: int) -> Floats:
+            status_then = status.copy()
+            status_then[group] = status[neighbour]
+            slip_then = np.where(status_then == _OPEN, 0, status_then)[rows.rubbing_rows]
+            tractions_then = of_status(rows, change[k], Status(status_then != _OPEN, slip_then))[0]
+            return np.asarray(per_traction.T @ (tractions_then - tractions))
+
+        return _sum_at_ends(status, (crack, position, piece), change_with, f.shape[1])
+
+    return np.array([of_state(k) for k in states])
 
 
 __all__ = []

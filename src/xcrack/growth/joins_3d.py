@@ -7,7 +7,7 @@ from itertools import combinations, permutations
 import numpy as np
 from scipy.special import exprel
 
-from xcrack.base.arrays import Floats, at
+from xcrack.base.arrays import Bools, Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import closed_fronts, front_frames
@@ -282,14 +282,14 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
     else:
         c, f = ligament.crack, ligament.front
         stations = solves_of(step)[0]
-        cycles, advance, _ = closing_annulus(*ligament.values, m)
+        cycles, advance, _ = closing_annulus(*ligament.radii, ligament.rates, m)
         longest_share = max(1.0, ligament.cell / plan.largest)
         way = min(cycles / plan.cycles, longest_share)
         cycles = way * plan.cycles
         share = np.full(len(stations), way)
         is_of_crack = stations.crack == c
-        if ligament.outer_way > 0:
-            share[is_of_crack] = min(advance / ligament.outer_way, longest_share)
+        if ligament.ways[1] > 0:
+            share[is_of_crack] = min(advance / ligament.ways[1], longest_share)
         share[is_of_crack & (stations.front == f)] = 0.0
         cracks_apart = _INTEGRATORS[rule.integrator].advanced_cracks(rule, step, share * plan.arc)
         crack, x = without_inner_front(cracks_apart[c], f)
@@ -310,29 +310,18 @@ class _Ligament:
     ----------
     crack, front : int
         Which, and its closed front around the ligament.
-    inner_radius, outer_radius : float, length
-    inner_rate, outer_rate : float, length/cycle
-        Means along the fronts.
-    inner_way, outer_way : float, length
-        Means of what is planned.
+    radii, rates, ways : (float, float), length, length/cycle and length
+        Of the inner front and the outer ones: rates and what is planned are means.
     cell : float, length
         Size of the cells there.
     """
 
     crack: int
     front: int
-    inner_radius: float
-    outer_radius: float
-    inner_rate: float
-    outer_rate: float
-    inner_way: float
-    outer_way: float
+    radii: tuple[float, float]
+    rates: tuple[float, float]
+    ways: tuple[float, float]
     cell: float
-
-    @property
-    def values(self) -> tuple[float, float, tuple[float, float]]:
-        """Radii and rates, as `closing_annulus` takes them."""
-        return self.inner_radius, self.outer_radius, (self.inner_rate, self.outer_rate)
 
 
 def _ligaments(step: Step, plan: Plan, body: Body) -> Iterator[_Ligament]:
@@ -355,22 +344,24 @@ def _ligaments(step: Step, plan: Plan, body: Body) -> Iterator[_Ligament]:
             ligament = _Ligament(
                 crack=c,
                 front=f,
-                inner_radius=radius,
-                outer_radius=max(float(np.sqrt(disc_area / np.pi)), radius),
-                inner_rate=float(rate[is_inner].mean()),
-                outer_rate=float(rate[is_outer].mean()) if is_outer.any() else 0.0,
-                inner_way=float(plan.arc[is_inner].mean()),
-                outer_way=float(plan.arc[is_outer].mean()) if is_outer.any() else 0.0,
+                radii=(radius, max(float(np.sqrt(disc_area / np.pi)), radius)),
+                rates=_mean_pair(rate, is_inner, is_outer),
+                ways=_mean_pair(plan.arc, is_inner, is_outer),
                 cell=float(body.cell_size(front.x).mean()),
             )
-            if ligament.inner_rate > 0:
+            if ligament.rates[0] > 0:
                 yield ligament
+
+
+def _mean_pair(values: Floats, is_inner: Bools, is_outer: Bools) -> tuple[float, float]:
+    outer_mean = float(values[is_outer].mean()) if is_outer.any() else 0.0
+    return float(values[is_inner].mean()), outer_mean
 
 
 def _closing_ligament(step: Step, plan: Plan, body: Body) -> _Ligament | None:
     """A ligament of whose radius less than a cell would be left: it breaks."""
     for ligament in _ligaments(step, plan, body):
-        if ligament.inner_radius - ligament.inner_way < _LIGAMENT * ligament.cell:
+        if ligament.radii[0] - ligament.ways[0] < _LIGAMENT * ligament.cell:
             return ligament
     return None
 
@@ -464,8 +455,6 @@ def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identit
         rule, rates, identities, step.cycles + plan.cycles, error, step
     )
     share = _share_of_cycles(step, plan, result, Body.of(mesh))
-    if share == 1.0:
-        return result
     return replace(result, cycles=step.cycles + share * plan.cycles)
 
 
@@ -484,11 +473,11 @@ def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> f
         front = (step.corrected[c].fronts or ())[ligament.front].tolist()
         if ligament.crack != c or front not in waiting_lines or set(front) in lines:
             continue
-        cycles, _, rate = closing_annulus(*ligament.values, m)
+        cycles, _, rate = closing_annulus(*ligament.radii, ligament.rates, m)
         if rate == 0:
             return 1.0
         softening = float(later_rate.mean()) / rate
-        return closing_annulus(*ligament.values, m, softening)[0] / cycles
+        return closing_annulus(*ligament.radii, ligament.rates, m, softening)[0] / cycles
     return 1.0
 
 
