@@ -1,6 +1,9 @@
 """Bodies of STEP files: closed, open, plane and of several parts, with sets by selectors."""
 
+import re
+import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -121,6 +124,37 @@ def test_what_is_no_body_says_so(tmp_path: Path) -> None:
 def test_wrong_sizes_are_errors(tmp_path: Path, size: Any, error: type, says: str) -> None:
     with pytest.raises(error, match=says):
         xc.mesh_step(step(tmp_path, plate), size=size)
+
+
+@pytest.mark.parametrize(
+    ("make", "side", "area"),
+    [
+        (lambda occ: occ.addCylinder(5, 5, 0, 0, 0, 2, R), "low", np.pi * R**2),
+        (plate, "high", 100 - np.pi * R**2),
+    ],
+    ids=["round bar", "plate with a hole"],
+)
+def test_a_load_on_a_coarse_end_of_a_round_side_is_named(
+    tmp_path: Path, make: Callable[[Any], None], side: str, area: float
+) -> None:
+    """The force is that of the straight outline, which no sum of forces shows."""
+    ends = {"top": lambda x: x[:, 2] > 2 - 1e-6, "base": lambda x: x[:, 2] < 1e-6}
+    mesh = xc.mesh_step(step(tmp_path, make), size=2.5, sets=ends)
+    corner = mesh.points[mesh.facet_sets["top"]]
+    straight = np.abs(np.cross(*np.diff(corner[..., :2], axis=1).transpose(1, 0, 2))).sum() / 2
+    pull = [xc.traction("top", (0, 0, 1)), xc.traction("base", (0, 0, -1))]
+    problem = xc.Problem(mesh, xc.Isotropic(E=1e3, nu=0.3), loads=pull, order=1)
+    with pytest.warns(xc.XcrackWarning, match=f"too {side}. Make cells there smaller") as found:
+        xc.solve(problem)
+    share = float(re.search(r" is ([\d.]+), above", str(found[0].message))[1])
+    # Discretisation: eight chords stand for an arc.
+    assert share == pytest.approx(abs(area - straight) / area, rel=0.04)
+    force = [xc.resultant("top", (0, 0, area)), xc.resultant("base", (0, 0, -area))]
+    fine = xc.mesh_step(step(tmp_path, make), size=0.4, sets=ends)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        xc.solve(replace(problem, loads=force))
+        xc.solve(replace(problem, mesh=fine))
 
 
 def test_a_file_that_gmsh_dies_of_is_refused(tmp_path: Path) -> None:

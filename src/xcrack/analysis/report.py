@@ -1,6 +1,6 @@
 """What a solve did, what it left out and why, and numbers that no part of a machine has."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,9 @@ from xcrack.crack.crack import Crack
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.system import System
 from xcrack.linalg.engine import Engine
+from xcrack.mesh.curved_facets import outline_gain
+from xcrack.mesh.mesh import Mesh, facet_set
+from xcrack.mesh.simplex import outward_areas
 from xcrack.model.loads import Load
 from xcrack.model.material import von_mises
 from xcrack.model.problem import Problem
@@ -228,6 +231,7 @@ def _resultant(model: System, name: str, f: Floats) -> Resultant:
 # Magnitudes that no part of a machine has: slips of units, or loads left out.
 
 # Limits beyond which a number is more likely a slip than a state of a part.
+_OUTLINE = 0.01  # share of the area of a loaded side that its straight outline lacks
 _MOVED = 0.02  # displacement over the size of the body
 _STRAINED = 0.01  # stress over Young's modulus
 _SHARE = 0.95  # of the volume: beside corners and point forces stress has no limit
@@ -294,10 +298,12 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
     if not any(solution.u.any() for solution in solutions):
         words = "give loads=[...], or a displacement that is not zero: K is zero everywhere."
         return [Alarm("the largest displacement", 0.0, 0.0, "in all load states", words)]
+    loads = dict.fromkeys(load for s in solutions for load in s.loads)
+    outline_alarms = _outlines(problem.mesh, loads) if problem.mesh.curves else []
     # What is imposed has no unit of a modulus.
-    forces = any("support" not in load.acts for s in solutions for load in s.loads)
+    forces = any("support" not in load.acts for load in loads)
     if not has_units(problem) or not forces:
-        return []
+        return outline_alarms
     alarms = [_displacement(solution) for solution in solutions]
     if stresses:
         alarms += [_stress(solution) for solution in solutions]
@@ -306,7 +312,30 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
         worst_alarm = worst_alarms.get(alarm.quantity)
         if alarm.value > alarm.limit and (worst_alarm is None or alarm.value > worst_alarm.value):
             worst_alarms[alarm.quantity] = alarm
-    return list(worst_alarms.values())
+    return outline_alarms + list(worst_alarms.values())
+
+
+def _outlines(mesh: Mesh, loads: Iterable[Load]) -> list[Alarm]:
+    """Loads by area on plane sides whose outline is too coarse for the curves there."""
+    alarms = []
+    for load in loads:
+        if "traction" not in load.acts or load.has_one_arrow:
+            continue
+        facets = facet_set(mesh, load.where, load.name)
+        area = float(np.linalg.norm(outward_areas(mesh, facets, load.name), axis=1).sum())
+        gain = outline_gain(mesh, facets)
+        share = abs(gain) / (area + gain)
+        if share > _OUTLINE:
+            place = "that its cells leave out" if gain > 0 else "by which its cells are too large"
+            words = (
+                f"the outline of {load.where!r} is curved and its cells are coarse, so that the "
+                f"force of {load.name}, and K with it, is {share:.1%} too "
+                f"{'low' if gain > 0 else 'high'}. Make cells there smaller, or give the force: "
+                f"xc.resultant({load.where!r}, (...))."
+            )
+            quantity = f"the share of the area of {load.where!r} {place}"
+            alarms.append(Alarm(quantity, share, _OUTLINE, "", words))
+    return alarms
 
 
 def _displacement(solution: Solution) -> Alarm:

@@ -24,6 +24,7 @@ _FLATTEST = 1e-4  # of its longest edge: a facet whose nodes are no farther from
 _SHARP = 0.9  # cosine of the angle across which two pieces are one smooth surface
 _NEIGHBOURS = 4  # nodes from whose pieces a nearest point is looked for
 _ROOMY = 1.1  # times the distance of the farthest node: pieces bulge between their nodes
+_CHORDS = 8  # that stand for the curve of an edge: a 64th of the area beside it is left out
 _STRAIGHT = 1e-9  # of an edge: middle of an arc this close to its chord
 _NAME = "curved_{}"
 _INNER = np.array([(0, 1, 2), (1, 0, 2), (2, 0, 1)])  # corners by weight of the inner nodes
@@ -276,6 +277,41 @@ def rows_of(pairs: Ints, pairs_to_find: Ints, n_points: int) -> tuple[Ints, Bool
     return row, has_row
 
 
+def outline_gain(mesh: Mesh, facets: Ints) -> float:
+    """Area between the straight outline of plane facets and the curves for which it stands.
+
+    Below zero where they reach beyond these, as beside a hole; zero in 2D, where an outline is
+    points. Facets that have a curve of their own do not count.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    facets : (k, d) array of int
+        Of its boundary.
+    """
+    sides = [(mesh.facet_sets[name], curve) for name, curve in mesh.curves.items()]
+    if mesh.dim == 2 or not sides:
+        return 0.0
+    curved_numbers = numbers_of(mesh, np.concatenate([side for side, _ in sides]))
+    facets = facets[~np.isin(numbers_of(mesh, facets), curved_numbers)]
+    corner = facets[:, local_edges(2)].reshape(-1, 2)
+    inner_corner = facets[:, [2, 1, 0]].ravel()
+    gain = 0.0
+    for side, curve in sides:
+        edges = np.unique(np.sort(side[:, local_edges(2)].reshape(-1, 2), axis=1), axis=0)
+        on_curve = rows_of(edges, np.sort(corner, axis=1), mesh.n_points)[1]
+        start, end = mesh.points[corner[on_curve]].transpose(1, 0, 2)
+        to_edge = (start + end) / 2 - mesh.points[inner_corner[on_curve]]
+        normal = np.cross(to_edge, end - start)
+        share = np.linspace(0.0, 1.0, _CHORDS + 1)[:, None, None]
+        line = (1 - share) * start + share * end
+        outline = getattr(curve, "border", None) or curve
+        line[1:-1] = np.reshape(outline(line[1:-1].reshape(-1, 3)), line[1:-1].shape)
+        fan = np.cross(line[:-1] - start, line[1:] - start).sum(axis=0) / 2
+        gain += float((fan * normal).sum(axis=1) @ (1 / np.linalg.norm(normal, axis=1)))
+    return gain
+
+
 def with_curves(mesh: Mesh, facets: Ints, nodes: Lattice) -> Mesh:
     """A mesh with its curved sides as sets, and the curves of these.
 
@@ -411,4 +447,7 @@ def _groups_without_conflict(conflicts: Bools, sides: Ints, sizes: Ints) -> list
     return [np.array(g) for g in groups]
 
 
-__all__ = ["CurvedFacets", "Lattice", "lattice", "raised_lattice", "rows_of", "with_curves"]
+__all__ = [
+    "CurvedFacets", "Lattice", "lattice", "outline_gain", "raised_lattice", "rows_of",
+    "with_curves",
+]  # fmt: skip
