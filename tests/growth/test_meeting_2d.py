@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import xcrack as xc
-from xcrack.crack.meetings import joined_cracks, meetings
 
 STEEL = xc.Isotropic(210e3, 0.3, "strain")
 PULL = [xc.traction("top", (0, 100.0)), xc.traction("bottom", (0, -100.0))]
@@ -102,30 +101,3 @@ def test_resumed_across_a_join_to_the_last_bit(lines, tmp_path):
         assert one.cycles == other.cycles
         for a, b in zip(one.sif[-1], other.sif[-1], strict=True):
             np.testing.assert_array_equal(a.K, b.K)
-
-
-def placed(lines, n=40):
-    return scene(lines, n).placed
-
-
-def test_what_a_tip_meets():
-    """Only what lies ahead within a cell and a half, seen along the last face."""
-    mesh = scene(INTO).mesh
-    assert meetings(placed(INTO), mesh) == []
-    near = [[(0, 10.05), (11.4, 10.05)], INTO[1]]
-    (own,) = meetings(placed(near), mesh)
-    assert (own.tip, own.crack, own.facing_tip) == (0, 1, -1)
-    assert own.distance == pytest.approx(np.linalg.norm(own.x - (11.4, 10.05)))
-    beside = [[(0, 10.05), (11.0, 10.05)], [(20, 13.05), (10.0, 13.05)]]
-    assert meetings(placed(beside), mesh) == []
-
-
-def test_a_tip_that_comes_to_another_tip_ends_a_cell_behind_it():
-    """Else the junction would lie within a cell of a tip, which nothing resolves."""
-    mesh = scene(INTO).mesh
-    cracks = placed([[(0, 10.05), (9.5, 10.05)], [(10.2, 9.9), (10.2, 15.0)]])
-    (own,) = [met for met in meetings(cracks, mesh) if met.tip == 0]
-    assert own.x[1] > 10.05 + 0.5
-    ended = joined_cracks(cracks, [False] * 3, [own])
-    assert ended[0].tips == ()
-    np.testing.assert_array_equal(ended[0].points[-1], own.x)

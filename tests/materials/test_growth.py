@@ -8,7 +8,6 @@ from scipy.integrate import quad
 
 import xcrack as xc
 from support import materials as scenes
-from xcrack.growth.interfaces import singularity_at_interface
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*passes from 'one' into 'two'")
 
@@ -91,42 +90,6 @@ def test_steps_end_a_cell_beside_another_stiffness(ratio):
     x = np.array([step.sif[0][0].x[0, 0] for step in steps])
     assert (np.abs(x - 0.5) > cell).all()
     assert x[0] < 0.5 < x[-1]
-
-
-def wedges(order, own, other):
-    """Conditions on stresses r^-order around a tip on an interface, opened symmetrically.
-
-    Airy functions r^(s + 1) F(θ) of the material of the crack and of that ahead (Williams 1952):
-    free faces, and stresses and displacements alike where the materials meet.
-    """
-    s = 1 - order
-
-    def columns(material, angle):
-        up, down = (s + 1) * angle, (s - 1) * angle
-        parts = []
-        for sine, cosine in ((np.sin, np.cos), (np.cos, lambda x: -np.sin(x))):
-            F = np.array([sine(up), sine(down)])
-            slope = np.array([(s + 1) * cosine(up), (s - 1) * cosine(down)])
-            u_r = np.array([-(s + 1) * sine(up), (material.kolosov - s) * sine(down)])
-            u_t = np.array([-(s + 1) * cosine(up), -(material.kolosov + s) * cosine(down)])
-            parts.append([(s + 1) * F, -slope, u_r / material.mu, u_t / material.mu])
-        return np.concatenate(parts, axis=1)
-
-    face, beside = columns(own, np.pi)[:2], columns(own, np.pi / 2)
-    ahead = columns(other, np.pi / 2)[:, 2:]  # the even half
-    return np.block([[face, np.zeros((2, 2))], [beside, -ahead]])
-
-
-@pytest.mark.parametrize("plane", ["strain", "stress"])
-@pytest.mark.parametrize("ratio", [0.045, 0.2, 3.0, 22.0])
-def test_the_order_of_stresses_at_an_interface(ratio, plane):
-    """The formula of Zak and Williams against the fields of two wedges, to round-off."""
-    own, other = xc.Isotropic(1.0, 0.35, plane), xc.Isotropic(ratio, 0.3, plane)
-    order = singularity_at_interface(own, other)
-    assert (order < 0.5) == (ratio > 1)
-    values = [np.linalg.svd(wedges(x, own, other))[1] for x in (order, order + 1e-3)]
-    assert values[0][-1] <= 1e-12 * values[0][0]
-    assert values[1][-1] >= 1e-5 * values[1][0]
 
 
 def test_the_criterion_has_the_ratio_of_Poisson_where_the_tip_is():

@@ -15,7 +15,10 @@ from fuzz.kinds import NONSENSE, VALID
 from fuzz.run import TABLE
 from xcrack import MeshError, ProblemError
 from xcrack.base import arguments as rules
-from xcrack.base.checks import call_function, number, numbers, whole_number, whole_numbers
+
+
+def checked(rule, value):
+    return rule.check(value, "x", ProblemError)
 
 
 class Hostile:
@@ -30,10 +33,10 @@ class Hostile:
     "value", [2, 2.0, np.float32(2), np.int8(2), np.array(2.0), Fraction(2), np.longdouble(2)]
 )
 def test_a_number(value):
-    result = number(value, "x")
+    result = checked(rules.Number(), value)
     assert type(result) is float
     assert result == 2.0
-    assert whole_number(value, "n") == 2
+    assert checked(rules.Whole(), value) == 2
 
 
 @pytest.mark.parametrize(
@@ -44,19 +47,19 @@ def test_a_number(value):
     ],
 )  # fmt: skip
 def test_no_number(value):
-    for check in (number, whole_number):
+    for rule in (rules.Number(), rules.Whole()):
         with pytest.raises(MeshError, match=r"^box: n = .* is not a number: give a .*number"):
-            check(value, "box: n", error=MeshError)
+            rule.check(value, "box: n", MeshError)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 10**400])
 def test_not_finite(value):
     with pytest.raises(ProblemError, match="is not possible: give a finite number"):
-        number(value, "x")
+        checked(rules.Number(), value)
 
 
 def test_bounds():
-    assert number(1, "x", least=1, most=1) == 1
+    assert checked(rules.Number(least=1, most=1), 1) == 1
     for bounds, words in (
         ({"above": 1}, "above 1"),
         ({"below": 1}, "below 1"),
@@ -64,24 +67,23 @@ def test_bounds():
         ({"most": 0}, "of at most 0"),
     ):
         with pytest.raises(ProblemError, match=rf"x = 1 is not possible: give .*number {words}\."):
-            number(1, "x", **bounds)
+            checked(rules.Number(**bounds), 1)
     with pytest.raises(ProblemError, match="whole number of at least 2"):
-        whole_number(1, "n", least=2)
+        checked(rules.Whole(least=2), 1)
     with pytest.raises(ProblemError, match="whole number of at most 0"):
-        whole_number(1, "n", most=0)
+        checked(rules.Whole(most=0), 1)
     for odd in (2.5, np.nan, np.inf):
         with pytest.raises(ProblemError, match="give a whole number"):
-            whole_number(odd, "n")
+            checked(rules.Whole(), odd)
 
 
 def test_an_array():
-    np.testing.assert_array_equal(numbers([[1, 2]], "x", (None, 2)), [[1.0, 2.0]])
-    np.testing.assert_array_equal(numbers([], "x", (0,)), [])
-    np.testing.assert_array_equal(numbers(range(3), "x"), [0, 1, 2])
-    np.testing.assert_array_equal(whole_numbers([1.0, 2.0], "x", (2,)), [1, 2])
-    assert np.isnan(numbers([np.nan], "x", must_be_finite=False)).all()
+    np.testing.assert_array_equal(checked(rules.Array((None, 2)), [[1, 2]]), [[1.0, 2.0]])
+    np.testing.assert_array_equal(checked(rules.Array((0,)), []), [])
+    np.testing.assert_array_equal(checked(rules.Array(), range(3)), [0, 1, 2])
+    np.testing.assert_array_equal(checked(rules.Array((2,), is_whole=True), [1.0, 2.0]), [1, 2])
     unmasked = np.ma.array([1.0, 2.0])
-    np.testing.assert_array_equal(numbers(unmasked, "x"), [1, 2])
+    np.testing.assert_array_equal(checked(rules.Array(), unmasked), [1, 2])
 
 
 @pytest.mark.parametrize(
@@ -106,25 +108,28 @@ def test_an_array():
 )
 def test_no_array(value, words):
     with pytest.raises(MeshError, match=words) as caught:
-        numbers(value, "points", (None, 2), error=MeshError)
+        rules.Array((None, 2)).check(value, "points", MeshError)
     assert str(caught.value).startswith("points")
 
 
 @pytest.mark.parametrize("value", [[0.5], [np.nan], [1e300], ["0"], [None]])
 def test_no_whole_numbers(value):
     with pytest.raises(ProblemError, match=r"^cells"):
-        whole_numbers(value, "cells", (None,))
+        rules.Array((None,), is_whole=True).check(value, "cells", ProblemError)
 
 
 def test_an_exception_of_a_users_function_keeps_its_type():
     def broken(x):
         raise ZeroDivisionError("mine")
 
+    body = xc.Problem(
+        xc.box((0, 0), (1, 1), 2), xc.Isotropic(1.0, 0.3, "strain"), supports=[xc.fix("bottom")],
+        loads=[xc.traction("top", broken)],
+    )  # fmt: skip
     with pytest.raises(ZeroDivisionError, match="mine") as caught:
-        call_function(broken, "the value of traction('top')", 1.0)
+        xc.solve(body)
     (note,) = caught.value.__notes__
     assert "broken, which xcrack called for the value of traction('top')" in note
-    assert call_function(lambda a, b: a + b, "a sum", 1, 2) == 3
 
 
 # --- declared rules: who has them, what they refuse, and that the table of drawn inputs agrees ----

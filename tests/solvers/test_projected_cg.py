@@ -1,4 +1,4 @@
-"""Contact by projected conjugate gradients, against the dense active set and a direct solver."""
+"""Contact by projected conjugate gradients, states beside one another: as with dense solvers."""
 
 import itertools
 from dataclasses import replace
@@ -10,18 +10,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import xcrack as xc
+import xcrack.linalg.products as row_blocks_file
 from support import scenes_2d as scenes
 from xcrack import ConvergenceError
-from xcrack.analysis.multipliers import gap_rows, multipliers
+from xcrack.analysis.multipliers import gap_rows, multipliers, vital_edges
 from xcrack.analysis.solve import build
+from xcrack.base.machine import threads
 from xcrack.fem.loads import load_vector
-from xcrack.linalg import iterative
+from xcrack.linalg import iterative, products
 from xcrack.linalg.active_set import active_set
 from xcrack.linalg.direct import system
 from xcrack.linalg.engine import ContactRows
-from xcrack.linalg.iterative import iterative_system
+from xcrack.linalg.iterative import best_guesses, independent_columns, iterative_system
+from xcrack.linalg.products import row_blocks
 from xcrack.linalg.projected_cg import (
     Operator,
+    Request,
     conjugate_gradients_steps,
     in_lockstep,
     projected_steps,
@@ -84,7 +88,7 @@ def test_against_enumeration(seed, g, start):
     assert (result.pressure * result.gap == 0).all()
 
 
-# A set that plain corrections leave and return to (the one of test_active_set).
+# A set that plain corrections leave and return to (the one of test_complementarity).
 CYCLING = np.array([[11.0, 13.0, -10.0], [13.0, 18.0, -15.0], [-10.0, -15.0, 15.0]])
 
 
@@ -484,3 +488,211 @@ def test_states_as_with_a_factor(monkeypatch, supported):
     assert closed[0] == 0
     assert closed[1] == 1
     assert 0 < closed[2] < 1
+
+
+def test_cover_of_edges_does_not_hang_on_numbers():
+    """Of edges as long as each other but for round-off, the first along the crack is removed."""
+    pairs = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+    length, place = np.ones(4), np.array([0.1, 0.2, 0.3, 0.4])
+    cover = vital_edges(pairs, length, place)
+    for k in range(4):
+        changed = length + 1e-12 * (np.arange(4) == k)
+        assert vital_edges(pairs, changed, place).tolist() == cover.tolist()
+    number = np.array([2, 0, 3, 1])
+    assert vital_edges(number[pairs], length, place).tolist() == cover.tolist()
+
+
+# --- states that are solved beside one another: bits as of each alone, multiples for nothing ------
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9])
+def test_products_of_several_vectors_are_those_of_each(dtype, count):
+    """To the bit, and round-off from scipy's, in blocks of any number of rows."""
+    rng = np.random.default_rng(90 + count)
+    first = np.cumsum([0, 3, 1, 6, 2, 0, 5, 3])
+    A = sp.random(first[-1], 17, 0.3, format="csr", rng=rng)
+    matrix = row_blocks([A], first, dtype)
+    x = rng.normal(size=(count, 17)).astype(dtype)
+    x[-1, 3] = np.inf if count > 1 else x[-1, 3]  # must not spoil those beside it
+    y = rng.normal(size=(count, first[-1])).astype(dtype)
+    alone = [matrix.add_product(own.copy(), -2.5, v) for own, v in zip(y, x)]
+    for k in range(0, count, 4):
+        wide, sums = np.zeros((17, 4), dtype), np.zeros((first[-1], 4), dtype)
+        wide[:, : len(x[k : k + 4])], sums[:, : len(x[k : k + 4])] = x[k : k + 4].T, y[k : k + 4].T
+        result = matrix.add_product(sums, -2.5, wide)
+        for c, own in enumerate(alone[k : k + 4]):
+            assert result[:, c].tobytes() == own.tobytes()
+    exact = y[0] - 2.5 * (A @ x[0])
+    np.testing.assert_allclose(alone[0], exact, rtol=0, atol=40 * np.finfo(dtype).eps)
+
+
+def test_matrices_made_by_threads_have_the_same_bits(monkeypatch):
+    """Products of sparse matrices and blocks of rows, in stretches however short."""
+    rng = np.random.default_rng(91)
+    A = sp.random(41, 30, 0.2, format="csr", rng=rng)
+    B = sp.random(30, 23, 0.3, format="csr", rng=rng)
+    first = np.cumsum([0, 3, 1, 6, 2, 0, 5, 3, 9, 12])
+
+    def made():
+        blocks = row_blocks([A, A @ B], first)
+        return products.product(A, B), blocks, blocks.times(np.ones(53))
+
+    alone, blocks, image = made()
+    np.testing.assert_allclose(alone.toarray(), A.toarray() @ B.toarray(), rtol=0, atol=1e-14)
+    monkeypatch.setattr(products, "_LEAST", 1)
+    monkeypatch.setattr(row_blocks_file, "_LEAST", 1)
+    for count in (2, 3, 16):
+        with threads(count):
+            shared, other, forces = made()
+        for name in ("indptr", "indices", "data"):
+            assert np.array_equal(getattr(shared, name), getattr(alone, name))
+        for name in ("first_row", "start", "offset", "columns", "values"):
+            assert np.array_equal(getattr(other, name), getattr(blocks, name))
+        assert forces.tobytes() == image.tobytes()
+
+
+def dense_operator(seed, n=30):
+    A = np.random.default_rng(seed).normal(size=(n, n + 5))
+    K = A @ A.T / n
+    diagonal = np.diag(K).copy()
+    asked = []
+
+    def all_of(function):
+        def several(vectors):
+            asked.append(len(vectors))
+            return [function(v) for v in vectors]
+
+        return several
+
+    one = (lambda v: K @ v), (lambda r: r / diagonal)
+    null = np.zeros((n, 0))
+    return K, Operator(*one, diagonal, null, *map(all_of, one)), asked
+
+
+def test_iterations_end_on_their_own():
+    """More of them than go at a time, of different lengths, one with nothing to do."""
+    K, operator, asked = dense_operator(71)
+    b = list(np.random.default_rng(72).normal(size=(7, 30)))
+    b[3] *= 0
+    limits = [1e-3, 1e-12, 1e-6, 1e-9, 1e-1, 1e-9, 1e-12]
+    runs = [conjugate_gradients_steps(operator, own, 0 * own, t) for own, t in zip(b, limits)]
+    results = in_lockstep(operator, runs)
+    assert max(asked) == 4
+    assert results[3][1] == 0
+    assert len({steps for _, steps in results}) > 3
+    for own, limit, (y, steps) in zip(b, limits, results):
+        assert np.linalg.norm(own - K @ y) <= 1.01 * limit * np.linalg.norm(own)
+        alone = in_lockstep(operator, [conjugate_gradients_steps(operator, own, 0 * own, limit)])[0]
+        assert alone[1] == steps
+        assert alone[0].tobytes() == y.tobytes()
+
+
+def test_the_first_that_fails_ends_all():
+    _, operator, _ = dense_operator(73)
+    b = list(np.random.default_rng(74).normal(size=(3, 30)))
+    runs = [
+        conjugate_gradients_steps(operator, own, 0 * own, 1e-12, limit)
+        for own, limit in zip(b, (90, 3, 90))
+    ]
+    with pytest.raises(ConvergenceError, match="after 3 steps"):
+        in_lockstep(operator, runs)
+
+
+def test_an_answer_for_each_request_in_any_order():
+    """Requests of different kinds at a time."""
+    operator = Operator(lambda v: 2 * v, lambda r: r + 1, np.ones(1), np.zeros((1, 0)))
+
+    def asking(kinds):
+        v = np.zeros(1)
+        for kind in kinds:
+            v = yield kind, v
+        return v[0]
+
+    patterns = ["tcc", "cct", "c", "", "ctctct"]
+    results = in_lockstep(
+        operator,
+        [asking([Request.TIMES if k == "t" else Request.CYCLE for k in p]) for p in patterns],
+    )
+    assert results == [2, 4, 1, 0, 14]
+
+
+def test_combinations_of_solved_loads_are_seen():
+    rng = np.random.default_rng(75)
+    K, operator, _ = dense_operator(76)
+    a, b, c = rng.normal(size=(3, 30))
+    vectors = [a, 0 * a, -3 * a, b, 1e6 * a + 1e-3 * b, a + 2 * b, a + 1e-7 * c, c]
+    assert independent_columns(vectors) == [0, 3, 7]
+    solved = [np.linalg.solve(K, v) for v in (a, b)]
+    guess, nothing = best_guesses(operator, solved, [a + 2 * b, 0 * a])
+    np.testing.assert_allclose(guess, solved[0] + 2 * solved[1], rtol=1e-9)
+    assert (nothing == 0).all()
+    assert (best_guesses(operator, [], [a])[0] == 0).all()
+
+
+def solved_block(n=6):
+    """Edge crack through a solved_block that is held at its bottom."""
+    crack = xc.plane_crack(
+        [(-1.5, -1.5, 0.03), (-0.1, -1.5, 0.03), (-0.1, 1.5, 0.03), (-1.5, 1.5, 0.03)]
+    )
+    numerics = xc.Numerics(linear="iterative")
+    return xc.Problem(
+        xc.box((-1,) * 3, (1,) * 3, n), xc.Isotropic(2.0, 0.3), [crack],
+        supports=[xc.fix("bottom")], numerics=numerics, order=1,
+    )  # fmt: skip
+
+
+def loads_of(stress):
+    """Traction on the top, given over x."""
+    return [xc.traction("top", lambda x: np.outer(stress(x[:, 0]), (0.1, 0, 1.0)))]
+
+
+def bending(factor):
+    return loads_of(lambda x: factor * (np.sin(x) + 0.45))
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_a_state_has_its_bits_whoever_runs_beside_it():
+    """Open, half closed and closed states, together, in another order, alone, with threads."""
+    problem = solved_block()
+    several = [
+        loads_of(np.ones_like),
+        bending(1.0),
+        loads_of(lambda x: -1 - x**2),
+        loads_of(lambda x: x + 0.6),
+    ]
+    together = xc.solve(problem, states=several)
+    shares = [s.contact[0].closed.mean() for s in together]
+    assert min(shares) == 0
+    assert max(shares) == 1
+    assert any(0 < share < 1 for share in shares)
+    turned = xc.solve(problem, states=several[::-1])[::-1]
+    numerics = xc.Numerics(linear="iterative", threads=2)
+    shared = xc.solve(replace(problem, numerics=numerics), states=several)
+    alone = xc.solve(problem, states=several[1:2])
+    for one, other, third in zip(together, turned, shared):
+        assert one.u.tobytes() == other.u.tobytes() == third.u.tobytes()
+        pressures = [s.contact[0].pressure.tobytes() for s in (one, other, third)]
+        assert len(set(pressures)) == 1
+    assert together[1].u.tobytes() == alone[0].u.tobytes()
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_multiples_of_a_load_cost_nothing():
+    """Half closed too: the same set, scaled; with another sign it is another state."""
+    one = xc.solve(solved_block(), states=[bending(1.0)])[0]
+    factors = 1.0, 0.3, 2.0
+    several = xc.solve(solved_block(), states=[bending(factor) for factor in factors])
+    assert 0 < one.contact[0].closed.mean() < 1
+    counts = [s.report.operations["iterations"] for s in (one, several[0])]
+    assert counts[0] == counts[1]
+    assert several[0].u.tobytes() == one.u.tobytes()
+    for solution, factor in zip(several, factors):
+        assert np.abs(solution.u - factor * one.u).max() <= 1e-12 * np.abs(one.u).max() * factor
+        assert (solution.contact[0].closed == one.contact[0].closed).all()
+    turned = xc.solve(solved_block(), states=[bending(1.0), bending(-1.0)])
+    alone = xc.solve(solved_block(), states=[bending(-1.0)])[0]
+    # The residual of the rough first look is scaled from the other state: no bits are the same.
+    assert np.abs(turned[1].u - alone.u).max() <= 1e-7 * np.abs(alone.u).max()
