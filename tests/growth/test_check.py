@@ -112,6 +112,20 @@ def test_a_scene_without_units_is_judged_by_its_rates_alone():
     assert xc.check(scene(steel(1.0)), LAW, CYCLE) == ()
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_sides_along_the_way_ahead_of_a_front_are_not_met():
+    """The way from a straight front runs along facets of a box: no number is made of these."""
+    sheet = xc.plane_crack(
+        [(-1.5, -1.5, 0.04), (0.1, -1.5, 0.04), (0.1, 1.5, 0.04), (-1.5, 1.5, 0.04)]
+    )
+    pull = [xc.traction("top", (0, 0, 100.0)), xc.traction("bottom", (0, 0, -100.0))]
+    metal = xc.Isotropic(E=210e3, nu=0.3, yield_stress=400.0)
+    body = xc.box((-1, -1, -1), (1, 1, 1), 4)
+    problem = xc.Problem(body, metal, [sheet], loads=pull, order=1)
+    alarms = xc.check(problem, xc.paris(1e-13, 3.0), CYCLE)
+    assert any("ligament ahead" in alarm.quantity for alarm in alarms)
+
+
 def test_growth_warns_of_the_same_once():
     problem = scene(steel(K_c=3000.0, yield_stress=100.0))
     alarms = xc.check(problem, LAW, CYCLE, K_c=300.0)

@@ -46,6 +46,23 @@ def test_table(whole, tmp_path):
     assert np.diff(own["a"]) == pytest.approx(own["da"][:-1], rel=1e-10)
 
 
+def test_printed(whole):
+    """The main columns in rows, all others by name; a step in one line."""
+    head, names, *rows = str(whole).splitlines()
+    assert head == repr(whole)
+    assert names.split() == [*("step", "N", "crack", "tip", "x", "y", "a"), "K_I_max", "K_II_max"]
+    assert len(rows) == 2 * N_STEPS
+    last = whole.steps[-1]
+    assert rows[-1].split()[-2] == f"{last.sif[1][1].K_I[0]:.6g}"
+    assert f"N = {last.cycles:.6g}" in repr(last)
+    assert "\n" not in repr(last)
+    text = str(whole.table())
+    assert max(map(len, text.splitlines())) <= 118
+    for name in whole.table().dtype.names:
+        assert name in text.replace("\n", " ")
+    assert str(whole.table()[["step", "a"]]).splitlines()[0].split() == ["step", "a"]
+
+
 def test_columns_that_say_how_far_K_is_to_be_trusted(whole):
     """The largest spread of all states and modes; domains are known where K says so."""
     steps = []

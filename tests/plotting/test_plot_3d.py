@@ -551,6 +551,12 @@ def test_a_hole_in_space_is_drawn_round():
     assert off_circle(edges.outline).max() < SEEN
     plane = given_plane(((0, 0, 0.5), ((1, 0, 0), (0, 1, 0))))
     assert off_circle(section_outline(solution.space.mesh, plane)).max() < SEEN
+    # Plane sides end on the arc too: the outline of a section along the axis is closed.
+    for y in (0.0, 0.1, 0.4):
+        beside = given_plane(((0, y, 0), ((1, 0, 0), (0, 0, 1))))
+        end = section_outline(solution.space.mesh, beside).reshape(-1, 2)
+        _, lines = np.unique(end.round(6), axis=0, return_counts=True)
+        assert (lines == 2).all()
 
 
 def test_normals_of_a_round_side_are_those_of_its_axis():

@@ -1,7 +1,8 @@
-"""Values as HTML: tables and whole pages that need no network; for reports and notebooks."""
+"""Values as HTML and as columns of text: tables, and whole pages that need no network."""
 
 import html
 import math
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -72,6 +73,38 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Any]], *, scroll: bool = 
     lead = f"<thead><tr>{top}</tr></thead>" if head else ""
     text = Markup(f"<table>{lead}<tbody>{body}</tbody></table>")
     return Markup(f'<div class="scroll">{text}</div>') if scroll else text
+
+
+_MOST_ROWS = 24  # of a table of text; of more the middle is left out
+_MOST_CHARACTERS = 118  # in a line of it
+
+
+def text_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Columns of text, set to the right, as many as a line takes; the others are counted.
+
+    Examples
+    --------
+    >>> print(text_table(("N", "a"), [(0, 2.0), (1200.0, 2.1234567)]))
+       N        a
+       0        2
+    1200  2.12346
+    """
+    half = _MOST_ROWS // 2
+    row_groups = [rows] if len(rows) <= _MOST_ROWS else [rows[:half], rows[-half:]]
+    lines = [[display_text(value) for value in row] for group in row_groups for row in group]
+    width = [max(map(len, column)) for column in zip(head, *lines, strict=True)]
+    ends = np.cumsum(np.array(width) + 2) - 2
+    n = max(1, int(np.searchsorted(ends, _MOST_CHARACTERS, side="right")))
+    text = [
+        "  ".join(value.rjust(w) for value, w in zip(line[:n], width, strict=False))
+        for line in (head, *lines)
+    ]
+    if len(row_groups) > 1:
+        text.insert(1 + half, f"... {len(rows) - 2 * half} more rows")
+    if n < len(head):
+        names = ", ".join(head[n:])
+        text.append(textwrap.fill(f"... {len(head) - n} more columns: {names}", _MOST_CHARACTERS))
+    return "\n".join(text)
 
 
 def list_markup(items: Sequence[Any]) -> Markup:

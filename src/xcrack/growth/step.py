@@ -398,7 +398,7 @@ class Corrected:
     earlier_zones: OverloadZones | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Step:
     """One state of the cracks during growth.
 
@@ -578,6 +578,11 @@ class Step:
                 raise ProblemError(
                     f"Step: {name} = {value_text(value)}: that is made by grow: leave it out."
                 )
+
+    def __repr__(self) -> str:
+        K_I = np.array([k for part in self.sif[-1:] for sif in part for k in sif.K[:, 0]])
+        values = f", K_I {K_I.min():.6g} to {K_I.max():.6g}" if len(K_I) else ""
+        return f"Step({self.index}, N = {self.cycles:.6g}, {len(self.cracks)} crack(s){values})"
 
     def _repr_html_(self) -> str:
         parts = zip(self.angle, self.dK_eq, self.R, self.rate, self.da, strict=True)

@@ -70,7 +70,7 @@ def _depth_ahead(x: Floats, direction: Floats, mesh: Mesh) -> float:
         gap_normal = np.cross(gap, first_side)
         v = gap_normal @ direction / volume
         t = (gap_normal * second_side).sum(axis=1) / volume
-    hit = (volume != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+        hit = (volume != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
     return float(t[hit].min(initial=np.inf))
 
 

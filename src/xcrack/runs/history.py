@@ -37,6 +37,7 @@ from xcrack.runs.table import (
     fracture_loads,
     measures_of_steps,
     measures_tables,
+    state_names,
     table,
     with_measures,
 )
@@ -144,6 +145,19 @@ class History:
         bar = self.life_bar.total
         life = f"{self.life:.6g}" + ("" if np.isnan(bar) else f" ± {bar:.2g}")
         return f"History({len(self.steps)} steps, {life} cycles, ended: {self.ended})"
+
+    def __str__(self) -> str:
+        """With the main columns of the table, and what happened on the way."""
+        if not self.steps:
+            return repr(self)
+        table = self.table()
+        names = table.dtype.names or ()
+        place = ["tip", "x", "y"] if "tip" in names else ["front"]
+        last_state = state_names(self.steps)[-1:]
+        stems = [f"K_{mode}_{state}" for state in last_state for mode in ("I", "II")]
+        K = {stem + end for stem in stems for end in ("", "_min", "_mean", "_max")}
+        shown_columns = ["step", "N", "crack", *place, "a", *(n for n in names if n in K)]
+        return "\n".join([repr(self), str(table[shown_columns]), *map(str, self.joins)])
 
     def _repr_html_(self) -> str:
         rows = [("steps", len(self.steps)), ("cycles N", self.life), ("ended", self.ended)]

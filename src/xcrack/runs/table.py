@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import ProblemError
+from xcrack.base.markup import text_table
 from xcrack.base.paths import write_texts
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import front_weights
@@ -48,6 +49,10 @@ class Table(np.ndarray[Any, Any]):
             key = columns[0] if isinstance(key, str) else columns
         result = super().__getitem__(key)
         return np.asarray(result) if isinstance(key, str) else result
+
+    def __str__(self) -> str:
+        names = self.dtype.names
+        return super().__str__() if names is None else text_table(names, self.ravel().tolist())
 
     def _by_number(self, name: str) -> str:
         """Column of K of a load state by its number, as "K_I_1"; the name where it is none."""

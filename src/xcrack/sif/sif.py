@@ -305,6 +305,24 @@ class SIF:
         )
         return f"SIF(K = [{rows}]{self._bars()})"
 
+    def __str__(self) -> str:
+        """In 3D with the values along the fronts."""
+        if self.K.shape[1] < 3 or not len(self.K):
+            return repr(self)
+        columns = self._columns()
+        names = ["front", "s", "x", "y", "z", "K_I", "K_II", "K_III"]
+        values = {name: columns[name].tolist() for name in names}
+        if self.errors is not None:
+            values["bar of K_I"] = self.bar[:, 0].tolist()
+        notes = [
+            " ".join([*["closed"] * bool(closed), *["at a surface"] * bool(at_surface)])
+            for closed, at_surface in zip(self.closed, self.at_surface, strict=True)
+        ]
+        if any(notes):
+            values[""] = notes
+        rows = list(zip(*values.values(), strict=True))
+        return f"{self!r}\n{markup.text_table(list(values), rows)}"
+
     def _values_along(self) -> str:
         if not len(self.K):
             return "SIF(no front)"

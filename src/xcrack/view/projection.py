@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Floats, lock
 from xcrack.base.checks import numbers, value_text
@@ -13,6 +14,7 @@ from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import interface_simplices
 from xcrack.output.curved_sides import CurvedSides
 
+_SHARED = 1e-9  # share of the body within which two ends of lines are one
 _AXIS = 0.999  # cosine from which a direction is called an axis
 
 
@@ -122,9 +124,19 @@ def section_outline(mesh: Mesh, plane: Projection) -> Floats:
     bary, parent = interface_simplices(level[rows])
     rows = rows[parent]
     lines = np.einsum("kwv,kvd->kwd", bary, mesh.points[facets[rows]])
-    if (curved_sides := CurvedSides.of(mesh)) is not None:
-        lines = curved_sides.on_curves(lines, np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows])
-    return on_plane(lines, plane)
+    if (curved_sides := CurvedSides.of(mesh)) is None:
+        return on_plane(lines, plane)
+    facet = np.nonzero(mesh.facet_to_cell[:, 1] < 0)[0][rows]
+    on_curve = curved_sides.facet_to_curve[facet] >= 0
+    end = lines[on_curve].reshape(-1, 3)
+    if len(end):  # plane sides end where the curved ones beside them do
+        places = curved_sides.project(end, np.repeat(facet[on_curve], 2))
+        distance, row = cKDTree(end).query(lines[~on_curve].reshape(-1, 3))
+        is_shared = (distance < _SHARED * mesh.extent).reshape(-1, 2)
+        flat_lines = lines[~on_curve]
+        flat_lines[is_shared] = places[row.reshape(-1, 2)[is_shared]]
+        lines[~on_curve] = flat_lines
+    return on_plane(curved_sides.on_curves(lines, facet), plane)
 
 
 __all__ = ["Projection", "best_plane", "given_plane", "on_plane", "section_outline"]
