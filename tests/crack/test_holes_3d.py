@@ -602,3 +602,32 @@ def test_a_crack_grows_from_a_notch(tmp_path, name):
         assert np.linalg.norm(inside - at, axis=1).max() < CRACK_DEPTH + 0.066 * k + 1e-3
     assert (np.diff(area) > 0).all()
     assert area[-1] < lens(radius, CRACK_DEPTH + 3 * 0.066)
+
+
+# --- beside a shoulder: a way out of one wall comes near another one ------------------------------
+
+
+def shoulder():
+    """A square column of side 2 on a square base of side 4, whose top is z = 0."""
+    block = xc.box((-2, -2, -2), (2, 2, 2), 16)
+    middle = block.points[block.cells].mean(axis=1)
+    keep = (middle[:, 2] < 0) | (np.abs(middle[:, :2]).max(axis=1) < 1)
+    used, cells = np.unique(block.cells[keep], return_inverse=True)
+    return xc.Mesh(block.points[used], cells.reshape(-1, 4))
+
+
+@pytest.mark.parametrize("slope", [0.35, 0.4, 0.45])
+def test_a_front_at_a_shoulder_ends_between_its_walls(slope):
+    """It went on over the base until it was two cells outside: below its top, beyond its edge.
+
+    In growth such an end came into the base, and was front there.
+    """
+    crack = xc.penny_crack((0.02, -1, 0.5), (0, -slope, 1), 0.55)
+    problem = xc.Problem(shoulder(), xc.Isotropic(E=1.0, nu=0.3), [crack])
+    (placed,) = problem.placed
+    front = placed.points[placed.fronts[0]]
+    beside = front[np.abs(front[:, 1]) > 1]
+    column = np.maximum(np.abs(beside[:, :2]) - 1, 0)
+    from_column, from_base = np.hypot(*column.T), beside[:, 2]
+    assert from_base.min() > 0.1
+    assert from_column[[0, -1]].min() > 0.4  # two cells of .25 along the way

@@ -370,8 +370,9 @@ def _way_out(
 ) -> Floats:
     """Lengths by which points move until they are some cells outside; zero: no way out.
 
-    Where the body begins again before, this is half way across the gap; where a way leads on
-    between walls that are no farther than that, it ends where it begins to.
+    Where the body begins again before, this is half way across the gap; where another wall comes
+    nearer, where both are as far; where a way leads on between walls that are no farther than that,
+    where it begins to.
 
     Parameters
     ----------
@@ -406,8 +407,11 @@ def _way_out(
         deep_enough = np.nonzero(row[first:stop] >= target_depth)[0]
         end = first + int(deep_enough[0]) if len(deep_enough) else stop - 1
         way_along = _way_along_wall(row[first : end + 1])
+        between_walls = _end_between_walls(row[first : end + 1], target_depth)
         if way_along is not None:
             result[k] = steps[first + way_along]
+        elif between_walls is not None and stop == len(steps):
+            result[k] = steps[first + between_walls]
         elif len(deep_enough) and first + deep_enough[0] > 0:
             j = first + int(deep_enough[0])
             result[k] = steps[j] - _STEP * (row[j] - target_depth) / (row[j] - row[j - 1])
@@ -426,6 +430,21 @@ def _way_along_wall(depth: Floats) -> int | None:
         if len(run) >= count and depth[run[0]] > ON:
             return int(run[0])
     return None
+
+
+def _end_between_walls(depth: Floats, target_depth: float) -> int | None:
+    """Sample at which a way outside ends that another wall comes nearer to; None: none does.
+
+    Where both walls are as far, but not before the way is as long as it should be deep: fields
+    around a front are measured from it, also in the body beside its end.
+    """
+    falls = np.nonzero(np.maximum.accumulate(depth) - depth > _SLACK)[0]
+    if not len(falls):
+        return None
+    top = int(np.argmax(depth[: falls[0]]))
+    near_wall = np.nonzero(depth[top:] < depth[top] / 2)[0]
+    last = top + int(near_wall[0]) if len(near_wall) else len(depth) - 1
+    return max(top, min(int(target_depth / _STEP), last))
 
 
 def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> float:

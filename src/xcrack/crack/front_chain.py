@@ -8,6 +8,7 @@ from xcrack.base.arrays import Bools, Floats, Ints, frozen_copy
 from xcrack.crack.fronts import steps, tangents
 
 _FEWEST = 8  # points of a closed front that are not merged for their spacing
+_ALIKE = 1e-7  # share by which sides differ whose lengths are one
 _PART = 0.1  # of its advance by which fairing may move a point
 _NOTCH = np.cos(np.radians(100.0))  # a hollow front that turns by more has a notch
 
@@ -237,12 +238,15 @@ def spaced_front(front: FrontChain, least_side: float) -> FrontChain:
         length = np.linalg.norm(front.side, axis=1)
         is_free = ~(front.is_pinned & np.roll(front.is_pinned, -1))[: len(length)]
         free_length = np.where(is_free, length, np.inf)
-        side = int(np.argmin(free_length))
-        if free_length[side] >= least_side:
+        shortest = free_length.min()
+        if shortest >= least_side:
             return front
+        # Sides of a regular front are alike but for round-off, which is no choice.
+        side = int(np.argmax(free_length <= (1 + _ALIKE) * shortest))
         end = (side + 1) % n
         # The point whose neighbour on the far side is nearer can better be spared.
-        point_that_stays = side if length[side - 1] > length[end % len(length)] else end
+        is_spared = length[side - 1] > (1 + _ALIKE) * length[end % len(length)]
+        point_that_stays = side if is_spared else end
         front = merge_side(front, side, front.x[point_that_stays])
 
 
