@@ -144,9 +144,9 @@ def test_a_load_on_a_coarse_end_of_a_round_side_is_named(
     straight = np.abs(np.cross(*np.diff(corner[..., :2], axis=1).transpose(1, 0, 2))).sum() / 2
     pull = [xc.traction("top", (0, 0, 1)), xc.traction("base", (0, 0, -1))]
     problem = xc.Problem(mesh, xc.Isotropic(E=1e3, nu=0.3), loads=pull, order=1)
-    with pytest.warns(xc.XcrackWarning, match=f"too {side}. Make cells there smaller") as found:
+    with pytest.warns(xc.XcrackWarning, match=f"too {side}. Make cells there smaller") as caught:
         xc.solve(problem)
-    share = float(re.search(r" is ([\d.]+), above", str(found[0].message))[1])
+    share = float(re.search(r" is ([\d.]+), above", str(caught[0].message))[1])
     # Discretisation: eight chords stand for an arc.
     assert share == pytest.approx(abs(area - straight) / area, rel=0.04)
     force = [xc.resultant("top", (0, 0, area)), xc.resultant("base", (0, 0, -area))]
