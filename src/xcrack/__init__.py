@@ -36,7 +36,7 @@ _HOME = {
     "surface_crack": "crack.surfaces",
     "read_surface": "crack.surfaces",
     "measures": "crack.measures",
-    "fix": "model.supports",
+    "fix": "model.loads",
     "displacement": "model.loads",
     "traction": "model.loads",
     "pressure": "model.loads",

@@ -23,7 +23,7 @@ from xcrack.base.description import describe
 from xcrack.base.units import Units
 from xcrack.fatigue.law import Constants
 from xcrack.growth.options import GrowthOptions
-from xcrack.model.supports import Support
+from xcrack.model.loads import Support
 
 DATA = Path(__file__).resolve().parents[1] / "data"
 MM = Units("mm", "N")

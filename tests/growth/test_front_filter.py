@@ -134,7 +134,7 @@ def test_noise_goes_and_the_mean_stays(closed):
     coarse = np.interp(np.arange(N) / 2.3, np.arange(40), rng.normal(size=40))
     angle = 0.004 * coarse + 0.01
     sif = front(-50 * angle, 0.2)
-    new = without_noise(sif, angle, np.array([closed]), np.array([LENGTH]))
+    new = without_noise(sif, angle, np.full(len(angle), closed), np.full(len(angle), LENGTH))
     assert new.std() < 0.6 * angle.std()
     assert new.mean() == pytest.approx(angle.mean(), abs=2e-4)
 
@@ -144,15 +144,15 @@ def test_a_wave_well_above_the_noise_stays(closed):
     s = np.arange(N) * LENGTH / N
     angle = 0.01 * np.cos(2 * np.pi * s / LENGTH)
     sif = front(-50 * angle, 0.15)  # K_II of 0.5 at most: within three times its noise
-    new = without_noise(sif, angle, np.array([closed]), np.array([LENGTH]))
+    new = without_noise(sif, angle, np.full(len(angle), closed), np.full(len(angle), LENGTH))
     assert new == pytest.approx(angle, abs=0.1 * 0.01)
 
 
 def test_mixed_mode_and_short_fronts_keep_their_angles():
     angle = np.random.default_rng(31).normal(size=N) * 0.3
     sif = front(-50 * angle, 0.2)
-    assert np.array_equal(without_noise(sif, angle, np.array([True]), np.array([LENGTH])), angle)
-    still = np.zeros(N)
     assert np.array_equal(
-        without_noise(front(still, 0.2), still, np.array([False]), np.array([1.0])), still
+        without_noise(sif, angle, np.full(len(angle), True), np.full(len(angle), LENGTH)), angle
     )
+    still = np.zeros(N)
+    assert np.array_equal(without_noise(front(still, 0.2), still, still > 0, 1.0 + still), still)

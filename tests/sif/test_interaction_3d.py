@@ -16,7 +16,7 @@ from support.front_fields import (
     tube,
 )
 from xcrack import GeometryError, Isotropic
-from xcrack.crack.front_curve import FrontCurve, front_curve
+from xcrack.crack.fronts import FrontCurve, front_curve
 from xcrack.sif.domain_3d import front_intensity
 from xcrack.sif.interaction_3d import (
     domain_integrals,

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import elliprd
 
 from support import exact
-from xcrack.crack.front_curve import front_curve
+from xcrack.crack.fronts import front_curve
 
 GAUSS = np.polynomial.legendre.leggauss
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from xcrack.crack.junctions_3d import body_of
+from xcrack.crack.junctions_3d import body_before
 from xcrack.growth.gaps import annulus_factors
 from xcrack.mesh.locate import Body
 
@@ -17,7 +17,8 @@ def areas(step):
     u, v = (a.ravel() for a in np.meshgrid(t, t))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     for c, crack in enumerate(step.cracks):
-        side, corner = body_of(step.cracks, c, body), crack.points[crack.faces]
+        side = body_before(step.cracks, c, body) if crack.ends_on else body
+        corner = crack.points[crack.faces]
         one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
         x = corner[:, None, 0] + u[:, None] * one[:, None] + v[:, None] * other[:, None]
         share = side.contains(x.reshape(-1, 3)).reshape(len(corner), -1).mean(axis=1)

@@ -14,6 +14,7 @@ from xcrack.crack.crack import Crack, crack_length
 from xcrack.crack.measures import DEEP, area_inside, cells_deep, front_length_inside
 from xcrack.crack.stations import GEOMETRY
 from xcrack.fem.enrichment import reach_of_tips
+from xcrack.linalg.engine import may_rub, takes_iterations
 from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import leg_sizes
@@ -21,12 +22,6 @@ from xcrack.model.problem import Problem, ProblemArgument
 
 # Unknowns and memory, foretold from mesh and cracks.
 
-# Unknowns of a 3D body above which a factorisation costs more, by order (measured).
-_DIRECT = {1: 4_000, 2: 8_000}
-# With friction conjugate gradients solve once for each row of pressure and shear: at 4 800 unknowns
-# of order 1 a factor takes a seventh of their time, at 17 000 of order 2 a seventeenth, and beyond
-# these unknowns more than 1.4 GB.
-_DIRECT_WITH_FRICTION = 50_000
 # Nodes that carry a jump lie within so many cells across a crack, by order.
 _LAYER = {1: 2.0, 2: 1.5}
 
@@ -112,12 +107,7 @@ def _memory(
         return factor * float(standard + enriched) ** power
     memory = float(np.dot(_OF_ROWS[problem.order or 1], (standard, enriched)))
     memory += _OF_STATE * (n_states - 1) * (standard + enriched)
-    return memory * (_RUBBING if _may_rub(problem) else 1.0)
-
-
-def _may_rub(problem: Problem) -> bool:
-    """Whether crack faces have friction."""
-    return problem.contact != "off" and any(problem.frictions)
+    return memory * (_RUBBING if may_rub(problem) else 1.0)
 
 
 def check_memory(problem: Problem, n_states: int = 1) -> None:
@@ -155,18 +145,6 @@ def _fits_surely(problem: Problem, n_states: int) -> bool:
     ways = {takes_iterations(problem, standard), takes_iterations(problem, standard + n_enriched)}
     memory = [_memory(problem, standard, n_enriched, way, n_states) for way in ways]
     return max(memory) <= free_bytes
-
-
-def takes_iterations(problem: Problem, n: int) -> bool:
-    """Whether a system of n unknowns is solved by conjugate gradients."""
-    linear_solver = problem.numerics.linear
-    if linear_solver != "auto":
-        return linear_solver == "iterative"
-    n_direct = _DIRECT_WITH_FRICTION if _may_rub(problem) else _DIRECT[problem.order or 1]
-    is_large = problem.mesh.dim == 3 and n > n_direct
-    if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
-        return False  # quadratic functions of both cracks nearly vanish together beside a junction
-    return is_large and problem.numerics.contact_method is None  # others change the matrix
 
 
 def _count_nodes(mesh: Mesh, order: int) -> int:
@@ -483,4 +461,4 @@ def _multipliers(problem: Problem) -> list[Ingredient]:
     ]
 
 
-__all__ = ["Forecast", "check_memory", "errors_by_order", "forecast_of", "takes_iterations"]
+__all__ = ["Forecast", "check_memory", "errors_by_order", "forecast_of"]

@@ -5,85 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from xcrack.analysis.contact import ContactSolution
 from xcrack.analysis.plan import Ingredient, Report, Resultant, ingredients_of
-from xcrack.analysis.solution import Solution
+from xcrack.analysis.solution import Solution, SolveOutcome
 from xcrack.base.arrays import Floats, Ints, at, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.fem.function_space import FunctionSpace
-from xcrack.fem.system import System
-from xcrack.linalg.engine import Engine
 from xcrack.mesh.curved_facets import outline_gain
 from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.mesh.simplex import outward_areas
 from xcrack.model.loads import Load
 from xcrack.model.material import von_mises
 from xcrack.model.problem import Problem
-
-
-@dataclass(frozen=True)
-class SolveOutcome:
-    """What a report says of a solve that its solutions do not keep.
-
-    Attributes
-    ----------
-    n_states : int
-    shared_part, solver_reason : str
-        What the load states share, and why the solver was taken; empty for the usual one.
-    operations : dict
-        As in `Report`.
-    multipliers : sequence of int or None
-        Unknowns on the faces of each crack; None without.
-    shear : sequence of int
-        Tangential unknowns of each crack that rubs.
-    n_motions : int
-        Rigid motions that were removed.
-    imbalance : float
-        Share of the loads that was out of balance.
-    unbalanced_share : float or None
-        Share of the energy of an initial stress that relaxes without any crack.
-    """
-
-    n_states: int
-    shared_part: str
-    solver_reason: str
-    operations: dict[str, int]
-    multipliers: Sequence[int | None]
-    shear: Sequence[int]
-    n_motions: int
-    imbalance: float
-    unbalanced_share: float | None
-
-
-def outcome_of(
-    problem: Problem,
-    model: System,
-    engine: Engine,
-    contact: ContactSolution,
-    n_motions: int,
-    imbalance: float,
-    n_states: int,
-    unbalanced_share: float | None,
-) -> SolveOutcome:
-    """Numbers of a solve for its report, which is written when it is asked for."""
-    method = problem.numerics.contact_method
-    has_unknowns = method is None or method.has_unknowns
-    multipliers = [None if m is None else has_unknowns * len(m.measure) for m in contact.spaces]
-    operations = {
-        "unknowns": engine.basis.shape[1],
-        "factorisations": engine.count.factorisations,
-        "solves": engine.count.solves,
-        **({"iterations": engine.count.iterations} if engine.reason else {}),
-        "assembled_cells": len(model.space.enriched_cells),
-        "integration_points": model.n_points,
-        "multipliers": sum(n or 0 for n in multipliers),
-        "contact_iterations": contact.sets,
-    }
-    shear = [len(work.shear) for work in contact.friction_work]
-    return SolveOutcome(
-        n_states, engine.shared_part, engine.reason, operations, multipliers, shear, n_motions,
-        imbalance, unbalanced_share,
-    )  # fmt: skip
 
 
 def report(
@@ -177,55 +109,6 @@ def _friction_row(row: Ingredient, outcome: SolveOutcome) -> Ingredient:
     if not outcome.shear:
         return replace(row, used=False, reason="no crack with friction has faces that press")
     return replace(row, unknowns=sum(outcome.shear))
-
-
-# Resultants of loads and reactions of supports.
-
-
-def resultants(
-    problem: Problem,
-    model: System,
-    loads: Sequence[Load],
-    vectors: Sequence[Floats],
-    residual: Floats,
-) -> tuple[Resultant, ...]:
-    """Force and moment of each load of a state and of the reaction of each support.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : System
-    loads : sequence of loads
-    vectors : sequence of (n_dof,) arrays, force
-        Of each load, scaled as in the state.
-    residual : (n_dof,) array, force
-        Stiffness times displacements less all loads; contact acts on jumps only.
-    """
-    rows = [
-        _resultant(model, load.name, vector)
-        for load, vector in zip(loads, vectors, strict=True)
-        if load.is_listed
-    ]
-    for number, support in enumerate(problem.supports):
-        rows_of_support = model.imposed_values.owner == number
-        rows.append(
-            _resultant(
-                model, f"reaction of {support.name}", np.where(rows_of_support, residual, 0.0)
-            )
-        )
-    return tuple(rows)
-
-
-def _resultant(model: System, name: str, f: Floats) -> Resultant:
-    """Sums over the standard functions, which together are one everywhere."""
-    x = model.space.node_points
-    forces = f.reshape(-1, x.shape[1])[: len(x)]
-    force = tuple(np.ascontiguousarray(forces.T).sum(axis=1).tolist())
-    product = x.T @ forces
-    spin = product - product.T
-    if len(force) < 3:
-        return Resultant(name, force, float(spin[0, 1]))
-    return Resultant(name, force, (float(spin[1, 2]), float(spin[2, 0]), float(spin[0, 1])))
 
 
 # Magnitudes that no part of a machine has: slips of units, or loads left out.
@@ -406,4 +289,4 @@ def _in_space(solution: Solution, sigma: Floats, cells: Ints, bary: Floats) -> F
     return stress
 
 
-__all__ = ["Alarm", "alarms_of_solutions", "has_units", "millimetre"]
+__all__ = ["Alarm", "alarms_of_solutions", "has_units", "millimetre", "report"]

@@ -11,9 +11,9 @@ from scipy.sparse.linalg import LinearOperator, cg
 
 from xcrack.analysis.contact import contact_of, solve_contact
 from xcrack.analysis.friction import slip_of
-from xcrack.analysis.plan import check_memory, takes_iterations
-from xcrack.analysis.report import alarms_of_solutions, outcome_of, report, resultants
-from xcrack.analysis.solution import FactoredSolution, Solution
+from xcrack.analysis.plan import check_memory
+from xcrack.analysis.report import alarms_of_solutions, report
+from xcrack.analysis.solution import FactoredSolution, Solution, outcome_of, resultants
 from xcrack.base.arguments import Function, Items, Switch, check_arguments
 from xcrack.base.arrays import Bools, Floats, lock
 from xcrack.base.checks import value_text
@@ -31,7 +31,7 @@ from xcrack.fem.loads import (
 )
 from xcrack.fem.system import System, build
 from xcrack.linalg.direct import Solver, system
-from xcrack.linalg.engine import Engine, SolverState
+from xcrack.linalg.engine import Engine, SolverState, takes_iterations
 from xcrack.linalg.iterative import iterative_system
 from xcrack.linalg.products import times
 from xcrack.linalg.rigid_motion import (
@@ -41,9 +41,8 @@ from xcrack.linalg.rigid_motion import (
     free_motion,
     without_motion,
 )
-from xcrack.model.loads import Load
+from xcrack.model.loads import Load, Support
 from xcrack.model.problem import LoadState, Problem, ProblemArgument, check_order
-from xcrack.model.supports import Support
 
 # How much of an initial stress the body cannot bear: its part out of balance.
 

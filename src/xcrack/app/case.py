@@ -37,11 +37,10 @@ from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.mesh.parts import part, selector
 from xcrack.mesh.refinement import refine
 from xcrack.model.deck import read_deck
-from xcrack.model.loads import Load
+from xcrack.model.loads import Load, Support
 from xcrack.model.material import Isotropic, Material, MaterialSets
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import Problem
-from xcrack.model.supports import Support
 from xcrack.runs.collect import names_of_sets
 
 _BODIES = ("mesh", "deck", "specimen")  # of which a file has one

@@ -34,10 +34,9 @@ from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options
 from xcrack.mesh.fields import Field, read_field, write_field
 from xcrack.mesh.files import write_mesh
-from xcrack.model.loads import Load
+from xcrack.model.loads import Load, Support
 from xcrack.model.material import Material, MaterialSets
 from xcrack.model.problem import Problem, ProblemArgument
-from xcrack.model.supports import Support
 from xcrack.runs.collect import names_of_sets
 
 _WIDTH = 96  # of a line; a longer array has a line for each entry

@@ -1,20 +1,17 @@
 """Growth of cracks in 3D: their fronts advance, and a strip of triangles joins the surface."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import value_text
 from xcrack.base.errors import GeometryError, warn
-from xcrack.crack.advance_in_body import (
-    Rays,
-    has_way_to_hole,
-    joined_front,
-    must_be_free,
-    rays_in_body,
-)
+from xcrack.crack.advance_in_body import BESIDE, SAMPLES, Rays, rays_in_body
+from xcrack.crack.boundary_trace import is_enclosed
 from xcrack.crack.crack import Crack
 from xcrack.crack.front_chain import (
     FrontChain,
@@ -28,8 +25,7 @@ from xcrack.crack.front_chain import (
     without_notches,
     without_sides,
 )
-from xcrack.crack.front_curve import front_curve
-from xcrack.crack.fronts import Front, front_frames, steps
+from xcrack.crack.fronts import Front, front_curve, front_frames, joined_front, steps
 from xcrack.crack.merging import through_holes
 from xcrack.mesh.distances import first_crossing, front_distance, surface_distance, triangle_tree
 from xcrack.mesh.locate import Body
@@ -116,7 +112,7 @@ def advance_fronts(
             _advanced_points(old_front, place, angle[is_member], da[is_member], size)
         )
     meeting_points = np.zeros((0, 3))
-    if body is not None and chains == single_fronts and not has_way_to_hole(rays_of_chains, body):
+    if body is not None and chains == single_fronts and not _has_way_to_hole(rays_of_chains, body):
         body = None  # no hole is near: the way of any front
     if body is not None:
         rays_of_chains, meeting_points = rays_in_body(rays_of_chains, size, body)
@@ -149,6 +145,23 @@ def advance_fronts(
     for k, strip in strips:
         _check_free(crack, grown_crack, k, strip, size, body, meeting_points)
     return grown_crack
+
+
+def _has_way_to_hole(rays_of_fronts: Sequence[Rays | None], body: Body) -> bool:
+    """Whether something that fronts send out comes from the body into a hole of it."""
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)[1:]
+    for rays in rays_of_fronts:
+        if rays is None:
+            continue
+        front, normal = rays[0], rays[2]
+        move = front.stop - front.start
+        x = front.start[:, None] + share[:, None] * move[:, None]
+        is_outside = ~body.contains(x.reshape(-1, 3)).reshape(len(move), -1)
+        rows = np.nonzero(is_outside.any(axis=1) & body.contains(front.start))[0]
+        leaving_points = x[rows, np.argmax(is_outside[rows], axis=1)]
+        if len(rows) and is_enclosed(leaving_points, normal[rows], body).any():
+            return True
+    return False
 
 
 def _check_reach(old_front: Front, x: Floats, da: float, size: float, body: Body) -> None:
@@ -482,14 +495,14 @@ def _check_free(
     if not new_front.is_closed:
         is_moved[[0, -1]] = False  # outside the body, beside the outline of the mouth
     probe = new_front.x[is_moved] + _AHEAD * size * _frames(new_front)[is_moved, 0]
-    probe = probe[must_be_free(new_front.x[is_moved], size, body, meeting_points)]
+    probe = probe[_must_be_free(new_front.x[is_moved], size, body, meeting_points)]
     phi, _, _ = surface_distance(probe, grown_crack.points, grown_crack.faces, _AHEAD * size)
     hit = probe[np.abs(phi) < 0.5 * _AHEAD * size]
     if not len(hit):
         path = strip.stop - strip.start
         length = np.linalg.norm(path, axis=1)
         # The faces around the start of a path are its own.
-        is_far = (length > 0.5 * size) & must_be_free(strip.stop, size, body, meeting_points)
+        is_far = (length > 0.5 * size) & _must_be_free(strip.stop, size, body, meeting_points)
         start = strip.start[is_far] + path[is_far] * (0.5 * size / length[is_far])[:, None]
         stop = strip.stop[is_far]
         triangle_hit, place = first_crossing(
@@ -502,3 +515,13 @@ def _check_free(
             f"{np.round(hit[0], 6).tolist()}: the ligament between them is cut through, which is "
             "not modelled. End growth before, or describe what has joined as one crack and go on."
         )
+
+
+def _must_be_free(x: Floats, size: float, body: Body | None, meeting_points: Floats) -> Bools:
+    """Which points of a front lie in the body, and not beside others that it meets `(n,)`."""
+    if body is None:
+        return np.ones(len(x), dtype=bool)
+    is_free = body.contains(x)
+    if len(meeting_points):
+        is_free &= cKDTree(meeting_points).query(x)[0] > BESIDE * size
+    return np.asarray(is_free)

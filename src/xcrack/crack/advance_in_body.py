@@ -10,17 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from xcrack.base.arrays import Bools, Floats, Ints, open_runs, runs_of
-from xcrack.crack.boundary_trace import is_enclosed, way_to_middle
+from xcrack.base.arrays import Floats, Ints, open_runs, runs_of
+from xcrack.crack.boundary_trace import way_to_middle
 from xcrack.crack.front_chain import FrontChain, chain
-from xcrack.crack.front_curve import front_curve
-from xcrack.crack.fronts import Front
 from xcrack.mesh.locate import Body
 
 Rays = tuple[FrontChain, Ints, Floats]  # what is sent out, which are vertices, normals there
 
 _LEAST = 0.02  # of the size: a shorter advance is none
-_SAMPLES = 16  # of a way, to find holes on it
+SAMPLES = 16  # of a way, to find holes on it
 _HOLE = 1.0  # sizes: a shorter way through a hole is passed over
 _ROOM = 0.5  # sizes that two fronts which meet leave between them
 _FACES = 0.5  # cosine between a way and another front that it leads to
@@ -28,37 +26,7 @@ _TANGENT = 1.5  # sizes over which the direction of a front at its end is taken
 _SHORT = 0.5  # sizes: an end outside the body that is shorter is none
 _CROSS = 0.5  # sizes by which two ends outside the body come closer only where they cross
 _THROUGH = 4.0  # sizes of the body that a way from end to end of a front may lead through
-_BESIDE = 4.0  # sizes from where fronts meet, and between their ends, where they may come close
-
-
-def joined_front(fronts: Sequence[Front], goes_round: bool) -> tuple[Front, list[float]]:
-    """Fronts in a row as one, and where on it each of them begins."""
-    if len(fronts) == 1 and fronts[0].is_closed == goes_round:
-        return fronts[0], [0.0]
-    x = np.concatenate([front.x for front in fronts])
-    frame = np.concatenate([front.frame for front in fronts])
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
-    number = np.concatenate([front.number for front in fronts])
-    first = np.cumsum([0, *(len(front.x) for front in fronts[:-1])])
-    front_of_all = Front(x, frame, goes_round, s, number)
-    return front_of_all, front_curve(x, frame, goes_round).breaks[first].tolist()
-
-
-def has_way_to_hole(rays_of_fronts: Sequence[Rays | None], body: Body) -> bool:
-    """Whether something that fronts send out comes from the body into a hole of it."""
-    share = np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]
-    for rays in rays_of_fronts:
-        if rays is None:
-            continue
-        front, normal = rays[0], rays[2]
-        move = front.stop - front.start
-        x = front.start[:, None] + share[:, None] * move[:, None]
-        is_outside = ~body.contains(x.reshape(-1, 3)).reshape(len(move), -1)
-        rows = np.nonzero(is_outside.any(axis=1) & body.contains(front.start))[0]
-        leaving_points = x[rows, np.argmax(is_outside[rows], axis=1)]
-        if len(rows) and is_enclosed(leaving_points, normal[rows], body).any():
-            return True
-    return False
+BESIDE = 4.0  # sizes from where fronts meet, and between their ends, where they may come close
 
 
 def rays_in_body(
@@ -126,24 +94,14 @@ def _still_at_vertices(front: FrontChain, vertex: Ints) -> FrontChain:
     )
 
 
-def must_be_free(x: Floats, size: float, body: Body | None, meeting_points: Floats) -> Bools:
-    """Which points of a front lie in the body, and not beside others that it meets `(n,)`."""
-    if body is None:
-        return np.ones(len(x), dtype=bool)
-    is_free = body.contains(x)
-    if len(meeting_points):
-        is_free &= cKDTree(meeting_points).query(x)[0] > _BESIDE * size
-    return np.asarray(is_free)
-
-
 def _stopped_in_holes(front: FrontChain, size: float, body: Body) -> FrontChain:
     """Ways that lead out of the body and in again end half way across what lies between."""
-    share = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)
     move = front.stop - front.start
     depth, _ = body.depth((front.start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
     is_outside = depth.reshape(len(move), -1) > 0
     first = np.argmax(is_outside, axis=1)
-    is_inside_again = ~is_outside & (np.arange(_SAMPLES + 1) > first[:, None])
+    is_inside_again = ~is_outside & (np.arange(SAMPLES + 1) > first[:, None])
     end = np.argmax(is_inside_again, axis=1)
     comes_back = ~is_outside[:, 0] & is_outside.any(axis=1) & is_inside_again.any(axis=1)
     width = (share[end] - share[first]) * np.linalg.norm(move, axis=1)
@@ -276,7 +234,7 @@ def _with_ends_outside(
     meeting_points = [np.zeros((0, 3))]
     for i in range(len(ends)):
         for j in range(i):
-            if np.linalg.norm(ends[i].path[0] - ends[j].path[0]) < _BESIDE * size:
+            if np.linalg.norm(ends[i].path[0] - ends[j].path[0]) < BESIDE * size:
                 meeting_points.append((ends[i].path[:1] + ends[j].path[:1]) / 2)
             ends[i], ends[j] = _cut_where_crossing(ends[i], ends[j], size)
     result = [
@@ -343,12 +301,12 @@ def _lead_out(x: Floats, size: float, body: Body) -> Floats | None:
 
 def _up_to_other_walls(start: Floats, stop: Floats, body: Body) -> Floats:
     """Points outside the body after a move, or the part of it over which no wall comes nearer."""
-    share = np.linspace(0.0, 1.0, _SAMPLES + 1)
+    share = np.linspace(0.0, 1.0, SAMPLES + 1)
     move = stop - start
     depth, size = body.depth((start[:, None] + share[:, None] * move[:, None]).reshape(-1, 3))
     depth, size = depth.reshape(len(move), -1), size.reshape(len(move), -1)
     is_nearer = depth < depth[:, :1] - 1e-9 * size
-    end = np.where(is_nearer.any(axis=1), np.argmax(is_nearer, axis=1) - 1, _SAMPLES)
+    end = np.where(is_nearer.any(axis=1), np.argmax(is_nearer, axis=1) - 1, SAMPLES)
     return np.asarray(start + share[end][:, None] * move)
 
 
@@ -371,7 +329,7 @@ def _cut_where_crossing(
 def _samples(path: Floats) -> tuple[Floats, Floats]:
     """Points along a path, and their arc lengths."""
     s = _arc(path)
-    at = np.linspace(0.0, s[-1], 4 * _SAMPLES + 1)
+    at = np.linspace(0.0, s[-1], 4 * SAMPLES + 1)
     return _point_on_path(path, at), at
 
 
@@ -455,7 +413,7 @@ def _way_across(
         if end.is_inside:
             return _up_to_other_walls(start, front.stop[rays], body), no_bends
         return np.zeros((0, 3)), no_bends
-    link = np.linspace(0.0, 1.0, 4 * _SAMPLES + 1)[:, None] * (last_end.path[-1] - first.path[-1])
+    link = np.linspace(0.0, 1.0, 4 * SAMPLES + 1)[:, None] * (last_end.path[-1] - first.path[-1])
     width = float(np.linalg.norm(link[-1]))
     if float(body.contains(first.path[-1] + link).mean()) * width > _THROUGH * size:
         # Other walls lie between: faces go on up to them.

@@ -18,7 +18,6 @@ from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
 from xcrack.crack.fronts import Front, front_frames
-from xcrack.crack.junctions import Junction
 from xcrack.mesh.distances import (
     TriangleTree,
     closest_in,
@@ -27,7 +26,6 @@ from xcrack.mesh.distances import (
     triangle_tree,
 )
 from xcrack.mesh.locate import Body
-from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.triangulation import sides
 
 _LED = 2.2  # cells beyond it, to which a front that comes to its face is led
@@ -84,7 +82,7 @@ def distance_to_side(cracks: Sequence[Crack], c: int, x: Floats) -> Floats:
     """Distance of points to the nearest crack on which crack c ends, negative beyond it `(n,)`."""
     result = np.full(len(x), np.inf)
     for on, side in cracks[c].ends_on:
-        result = np.minimum(result, side * _signed_distance(cracks[on], x))
+        result = np.minimum(result, side * signed_distance(cracks[on], x))
     return result
 
 
@@ -139,17 +137,16 @@ class BodyBefore(Body):
         return np.asarray(np.maximum(_STEEP / np.maximum(sine, _LEAST_SINE), 1.0))
 
 
-def body_of(cracks: Sequence[Crack], c: int, body: Body) -> Body:
-    """The body for one of some cracks: without what lies beyond others on which it ends."""
-    if not cracks[c].ends_on:
-        return body
+def body_before(cracks: Sequence[Crack], c: int, body: Body) -> Body:
+    """The body for an arm among some cracks: without what lies beyond those on which it ends."""
     cracks_under = tuple(
         (triangle_tree(cracks[on].points, cracks[on].faces), side) for on, side in cracks[c].ends_on
     )
     return BodyBefore(body.mesh, body.boundary, body.facet_size, cracks_under, cracks[c])
 
 
-def _signed_distance(crack: Crack, x: Floats) -> Floats:
+def signed_distance(crack: Crack, x: Floats) -> Floats:
+    """Distance of points to the faces of a crack, positive on the side of its lip + `(n,)`."""
     return signed_in(triangle_tree(crack.points, crack.faces), x)[0]
 
 
@@ -222,22 +219,6 @@ def check_numbers(cracks: Sequence[Crack]) -> None:
             )
 
 
-def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
-    """Which placed cracks in 3D end on others, and a point where they meet."""
-    result = []
-    for c, crack in enumerate(cracks):
-        for on, side in crack.ends_on:
-            line = crossings(crack, cracks[on])
-            if not len(line):
-                d = np.abs(_signed_distance(cracks[on], crack.points))
-                line = crack.points[[int(np.argmin(d))]]
-            is_inside = Body.of(mesh).contains(line)
-            line = line[is_inside] if is_inside.any() else line
-            middle = line[int(np.argmin(np.linalg.norm(line - line.mean(axis=0), axis=1)))]
-            result.append(Junction(c, -1, on, middle, side, middle, np.inf))
-    return tuple(result)
-
-
 # Fronts that come to the face of another crack: straight ahead through it, and arms from there.
 
 
@@ -296,19 +277,19 @@ def _ways_to_face(
     box_max = cracks[on].points.max(axis=0) + largest_reach
     result = []
     tree: TriangleTree | None = None
-    body_before = body
+    body_of_crack = body
     for front in front_frames(cracks[c]):
         rows = np.nonzero(((front.x >= box_min) & (front.x <= box_max)).all(axis=1))[0]
         if not len(rows):
             continue
         if tree is None:
             tree = triangle_tree(cracks[on].points, cracks[on].faces)
-            body_before = body_of(cracks, c, body)
+            body_of_crack = body_before(cracks, c, body) if cracks[c].ends_on else body
         leg = _LEG * body.cell_size(front.x)
         start, advance = front.x[rows], (reach * leg[:, None] * front.frame[:, 0])[rows]
         triangle, share = first_crossing(tree, start, start + advance)
-        is_met = (triangle >= 0) & body_before.contains(start)
-        is_met &= body_before.contains(start + np.where(is_met, share, 0.0)[:, None] * advance)
+        is_met = (triangle >= 0) & body_of_crack.contains(start)
+        is_met &= body_of_crack.contains(start + np.where(is_met, share, 0.0)[:, None] * advance)
         way = np.full(len(front.x), np.inf)
         way[rows[is_met]] = (share * reach * leg[rows])[is_met]
         result.append((front, way, leg))
@@ -490,7 +471,7 @@ __all__ = [
     "FaceAhead",
     "are_opposite",
     "arm",
-    "body_of",
+    "body_before",
     "check_numbers",
     "crossings",
     "distance_to_side",
@@ -501,6 +482,6 @@ __all__ = [
     "led_through",
     "may_touch",
     "renumbered_arms",
-    "surface_junctions",
+    "signed_distance",
     "with_room",
 ]

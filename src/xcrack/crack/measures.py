@@ -10,7 +10,7 @@ from xcrack.base.arguments import Part, check_arguments
 from xcrack.base.arrays import Bools, Floats, Ints, lock, ranges
 from xcrack.base.errors import GeometryError, ProblemError
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.junctions_3d import body_of
+from xcrack.crack.junctions_3d import body_before
 from xcrack.crack.stations import place_crack
 from xcrack.mesh.distances import distance_to_simplices, signed_in
 from xcrack.mesh.locate import Body, parts_inside
@@ -195,15 +195,21 @@ def crack_size(cracks: Sequence[Crack], c: int, mesh: Mesh) -> float:
     crack = cracks[c]
     if crack.fronts is None:
         return length_inside(crack, mesh)
-    return surface_size(crack, mesh, body_of(cracks, c, Body.of(mesh)))
+    return surface_size(crack, mesh, _body_of(cracks, c, mesh))
 
 
 def crack_areas(cracks: Sequence[Crack], mesh: Mesh) -> Floats:
     """Areas of placed cracks that count as in `crack_size` `(c,)`, in 2D lengths."""
     if mesh.dim == 2:
         return np.array([length_inside(crack, mesh) for crack in cracks])
+    areas = [area_inside(x, mesh, _body_of(cracks, c, mesh)) for c, x in enumerate(cracks)]
+    return np.array(areas)
+
+
+def _body_of(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Body:
+    """The body for one of some cracks: without what lies beyond others on which it ends."""
     body = Body.of(mesh)
-    return np.array([area_inside(x, mesh, body_of(cracks, c, body)) for c, x in enumerate(cracks)])
+    return body_before(cracks, c, body) if cracks[c].ends_on else body
 
 
 # Cells by which a crack must be deep at order 1 in 3D: K is up to 6.1 % low below, within 2 % above

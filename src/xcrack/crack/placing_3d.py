@@ -19,13 +19,15 @@ from xcrack.crack.boundary_trace import (
     under_holes,
 )
 from xcrack.crack.crack import Crack
+from xcrack.crack.junctions import Junction
 from xcrack.crack.junctions_3d import (
     are_opposite,
-    body_of,
+    body_before,
     check_numbers,
     crossings,
     is_before,
     may_touch,
+    signed_distance,
 )
 from xcrack.crack.merging import joined_fronts
 from xcrack.mesh.distances import closest_in, first_crossing, signed_in, triangle_tree
@@ -393,7 +395,7 @@ def place_arm(cracks: Sequence[Crack], c: int, mesh: Mesh) -> Crack:
     mesh : Mesh
     """
     crack = cracks[c]
-    placed_crack = _placed_crack(crack, body_of(cracks, c, Body.of(mesh)))[0]
+    placed_crack = _placed_crack(crack, body_before(cracks, c, Body.of(mesh)))[0]
     return replace(placed_crack, ends_on=crack.ends_on)
 
 
@@ -427,12 +429,30 @@ def arms_placed(
         if crack.ends_on and crack.fronts is None:
             is_too_small = _check_reach(result, c, Body.of(mesh))
             try:
-                placed_crack, short_fronts = _placed_crack(crack, body_of(result, c, Body.of(mesh)))
+                placed_crack, short_fronts = _placed_crack(
+                    crack, body_before(result, c, Body.of(mesh))
+                )
             except CoarseMeshError as error:
                 raise CoarseMeshError(is_too_small) from error
             if short_fronts and not placed_crack.fronts:
                 raise CoarseMeshError(is_too_small)
             result[c] = replace(placed_crack, ends_on=crack.ends_on)
+    return tuple(result)
+
+
+def surface_junctions(cracks: tuple[Crack, ...], mesh: Mesh) -> tuple[Junction, ...]:
+    """Which placed cracks in 3D end on others, and a point where they meet."""
+    result = []
+    for c, crack in enumerate(cracks):
+        for on, side in crack.ends_on:
+            line = crossings(crack, cracks[on])
+            if not len(line):
+                d = np.abs(signed_distance(cracks[on], crack.points))
+                line = crack.points[[int(np.argmin(d))]]
+            is_inside = Body.of(mesh).contains(line)
+            line = line[is_inside] if is_inside.any() else line
+            middle = line[int(np.argmin(np.linalg.norm(line - line.mean(axis=0), axis=1)))]
+            result.append(Junction(c, -1, on, middle, side, middle, np.inf))
     return tuple(result)
 
 
@@ -773,4 +793,4 @@ def meeting_points(crack_a: Crack, crack_b: Crack, body: Body) -> Floats:
     return points[body.contains(points)]
 
 
-__all__ = []
+__all__ = ["surface_junctions"]

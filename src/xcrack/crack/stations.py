@@ -10,15 +10,15 @@ from xcrack.base.arrays import Bools, Floats, Ints, lock
 from xcrack.base.errors import GeometryError
 from xcrack.crack import junctions as junctions_2d
 from xcrack.crack.crack import Crack, tip_frames
-from xcrack.crack.front_curve import FrontCurve, front_curve
-from xcrack.crack.fronts import front_frames
+from xcrack.crack.fronts import FrontCurve, front_curve, front_frames
 from xcrack.crack.junctions import Junction
-from xcrack.crack.junctions_3d import is_before, surface_junctions
+from xcrack.crack.junctions_3d import is_before
 from xcrack.crack.placing_2d import check_lines, place_line, vertices_on_mesh
 from xcrack.crack.placing_3d import (
     ShortFront,
     arms_placed,
     check_surfaces,
+    surface_junctions,
     surface_placement,
 )
 from xcrack.mesh.locate import contains

@@ -22,9 +22,8 @@ from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, local_edges
 from xcrack.model.elasticity import Elasticity
-from xcrack.model.loads import FacetPoints, Load
+from xcrack.model.loads import FacetPoints, Load, Support
 from xcrack.model.material import isotropic_part
-from xcrack.model.supports import Support
 
 _POINTS, _DEGREE = 3, 4  # where tip functions act; of the products of a cubic and a quadratic
 

@@ -15,8 +15,7 @@ from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
 from xcrack.mesh.mesh import facet_set, nearest_nodes, nearest_point, numbers_of
 from xcrack.mesh.simplex import facet_nodes
 from xcrack.model.elasticity import Elasticity
-from xcrack.model.loads import FacetPoints, Load
-from xcrack.model.supports import Support
+from xcrack.model.loads import FacetPoints, Load, Support
 
 
 def load_vector(

@@ -33,32 +33,32 @@ _REACH = np.logspace(
 )  # times the range, where its threshold is looked for
 
 
-def alarms_of_step(rule: GrowthRule, step: Step) -> list[Alarm]:
-    """What is beyond its limit at a step; magnitudes are judged at the first one.
+def judged_step(rule: GrowthRule, step: Step) -> tuple[Validity | None, list[Alarm]]:
+    """How far elasticity holds at a step, by its material, and what is beyond its limit.
 
-    Parameters
-    ----------
-    rule : GrowthRule
-    step : Step
+    Magnitudes are judged at the first step. A K_c of the run only says where it ends.
     """
     if step.has_left or not step.sif:
-        return []
+        return None, []
     alarms: list[Alarm] = []
     if step.index == 0:
         if solutions := _solutions(rule, step):
             alarms += alarms_of_solutions(solutions)
         if not any("in all load states" in alarm.place for alarm in alarms):
             alarms += _factors(rule) + _rate(rule, step)
-    check = step.validity if rule.K_c is None else None
-    check = check or validity_of(rule, step, rule.toughness)
+    by_material = _validity_of(rule, step, rule.problem.elasticity.material.K_c)
+    check = by_material if rule.K_c is None else _validity_of(rule, step, rule.K_c)
     if check is not None:
-        limits = check.alarms()
         # Later in a run it is why growth ends.
-        alarms += [a for a in limits if step.index == 0 or not a.quantity.startswith("K over")]
-    return alarms
+        alarms += [
+            alarm
+            for alarm in check.alarms()
+            if step.index == 0 or not alarm.quantity.startswith("K over")
+        ]
+    return by_material, alarms
 
 
-def validity_of(rule: GrowthRule, step: Step, K_c: float | None) -> Validity | None:
+def _validity_of(rule: GrowthRule, step: Step, K_c: float | None) -> Validity | None:
     """Plastic zones, toughness and net sections of a step; None where nothing is known of these."""
     material = rule.problem.elasticity.material
     if material.yield_stress is None and K_c is None:
@@ -246,4 +246,4 @@ def _no_growth(rule: GrowthRule, step: Step, units: str) -> list[Alarm]:
     return [Alarm(quantity, float(factor * K_scale), K_scale, "", words)]
 
 
-__all__ = ["alarm_of_energy", "alarm_of_life", "alarms_of_step", "validity_of"]
+__all__ = ["alarm_of_energy", "alarm_of_life", "judged_step"]

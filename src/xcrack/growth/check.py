@@ -9,7 +9,7 @@ from xcrack.fatigue.criteria import Criterion, max_hoop_stress
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.alarms import alarms_of_step
+from xcrack.growth.alarms import judged_step
 from xcrack.growth.options import GrowthOptions, lists_options, run_of
 from xcrack.growth.run import first_step
 from xcrack.model.problem import Problem
@@ -80,7 +80,7 @@ def check(
     run = run_of("check", problem, law, criterion, cycle, da if has_length else _ANY, options)
     with collected_warnings([]):  # those of K are not what is asked for
         step = first_step(replace(run, tolerance=None, max_unknowns=None, da=_ANY))
-    return tuple(alarms_of_step(run, step))
+    return tuple(judged_step(run, step)[1])
 
 
 __all__ = ["check"]

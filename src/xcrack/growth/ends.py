@@ -169,7 +169,7 @@ def toughness_is_reached(rule: GrowthRule, step: Step) -> str:
 def interface_is_passed(rule: GrowthRule, step: Step) -> str:
     """A tip is in a material in which none was at the start, and the run stops there."""
     elasticity = rule.problem.elasticity
-    if not rule.stop_at_interface or len(elasticity.named) < 2:
+    if not rule.stop_at_interface or not rule.has_interfaces:
         return ""
     start = stations_of(rule.problem.placed, rule.problem.mesh).x
     start_names = set(elasticity.names_at(start).tolist())

@@ -15,7 +15,7 @@ from xcrack.crack.meetings import LEAST, joined_cracks, meetings
 from xcrack.crack.placing_3d import place_arms
 from xcrack.fatigue.cycle import cycles_between
 from xcrack.growth import fronts
-from xcrack.growth.fronts import advanced_crack, front_lengths, interpolate_along_front
+from xcrack.growth.fronts import advanced_crack, interpolate_along_front, solved_ends
 from xcrack.growth.interfaces import (
     InterfacesAhead,
     cycles_across,
@@ -28,7 +28,7 @@ from xcrack.growth.interfaces import (
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates, rates_by_law_of
 from xcrack.growth.solves import SolveHistory
-from xcrack.growth.stations import GrowthStations, Identities, PerCrack, directions
+from xcrack.growth.stations import Identities, PerCrack
 from xcrack.growth.step import Corrected, Plan, Step, StepError, moved_places, plan_of, solves_of
 from xcrack.growth.step_length import longest_advance
 from xcrack.mesh.locate import cell_sizes
@@ -53,7 +53,9 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     growth = stations.growth(score, length)
     is_growing = growth >= ends.waits_below * cell
     way = np.where(is_growing, growth, 0.0)
-    interfaces = ends.interfaces_ahead(rule, stations.x, way[:, None] * solves.direction[-1])
+    interfaces = None
+    if rule.has_interfaces:
+        interfaces = ends.interfaces_ahead(rule, stations.x, way[:, None] * solves.direction[-1])
     if interfaces is not None and (way > interfaces.stop).any():  # a step ends before it, or behind
         is_beyond = way > interfaces.stop
         length *= float((interfaces.goal[is_beyond] / way[is_beyond]).min())
@@ -142,21 +144,12 @@ def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) 
 def _step_of_solve(
     rule: GrowthRule, rates: Rates, identities: Identities, cycles: float, growth_owed: Floats
 ) -> Corrected:
-    at, n = rates.stations, len(rates.stations)
-    is_closed, length = np.zeros(n, dtype=bool), np.zeros(n)
-    if rates.problem.mesh.dim == 3:
-        for c, crack in enumerate(rates.cracks):
-            rows = at.crack == c
-            is_closed[rows] = np.array(closed_fronts(crack), dtype=bool)[at.front[rows]]
-            length[rows] = front_lengths(crack)[at.front[rows]]
-    direction = directions(at.frame, rates.angle)
-    stations = GrowthStations(
-        at.crack, at.front, at.s, at.x, at.frame, identities.of(at), is_closed, length,
-        growth_owed[:, None] * direction, np.zeros(n, dtype=bool),
-    )  # fmt: skip
+    direction = rates.direction
+    stations = solved_ends(rates, identities)
+    stations = replace(stations, offset=growth_owed[:, None] * direction)
     solves = SolveHistory(
         np.zeros(1), rates.law_rate[None], rates.dK_eq[None], direction[None],
-        rates.size_of_law, np.zeros(n), rates.exponent(rule.law),
+        rates.size_of_law, np.zeros(len(stations)), rates.exponent(rule.law),
     )  # fmt: skip
     return Corrected(cycles, rates.cracks, stations, solves)
 
@@ -189,9 +182,10 @@ def _followed_2d(rule: GrowthRule, step: Step, rates: Rates) -> tuple[float, Flo
     j = int(np.argmax(np.where(choice, rate0, -1.0)))
     if not has_row[j]:
         return float(da[j] / rate0[j]), growth_owed
-    interfaces = interfaces_ahead(rule, stations.x, plan_of(step).move)
-    if interfaces is not None and da[j] > interfaces.way[j]:
-        return _cycles_across(rule, step, rates, interfaces, j, int(row[j])), growth_owed
+    if rule.has_interfaces:
+        interfaces = interfaces_ahead(rule, stations.x, plan_of(step).move)
+        if interfaces is not None and da[j] > interfaces.way[j]:
+            return _cycles_across(rule, step, rates, interfaces, j, int(row[j])), growth_owed
     c = int(stations.crack[j])
     a = step.sizes[c] * float(da[j] / da[stations.crack == c].sum())
     return float(cycles_between(a, a + da[j], rate0[j], rates.law_rate[row[j]])), growth_owed

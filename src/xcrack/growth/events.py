@@ -1,7 +1,7 @@
 """What happens between two steps: ends that come to the boundary, and cracks that meet."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from xcrack.crack.merging import ends_at_holes
 from xcrack.crack.stations import place_crack
 from xcrack.fem.system import discretise
 from xcrack.growth import joins_3d
-from xcrack.growth.integrator import integrator_of
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.step import Arrival, Join, Plan, Step, moved_places, plan_of
 from xcrack.linalg.rigid_motion import pieces
@@ -23,8 +22,6 @@ from xcrack.mesh.distances import signed_in
 from xcrack.mesh.locate import ON, Body
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.problem import Problem
-
-_ROUND_OFF = 1e-12  # of the body: a place as near to zero is zero
 
 # Cracks that meet.
 
@@ -119,26 +116,9 @@ _BISECTIONS = 40
 _LONGER = (2.0, 4.0, 8.0)  # times an advance: ways on which the last pieces of a front leave
 
 
-@dataclass(frozen=True)
-class Arriving:
-    """An arrival during an advance that is not solved yet.
-
-    Attributes
-    ----------
-    crack, tip, x, name, ligament, end, label
-        As of `Arrival`.
-    part : float
-        Of the advance until then; above 1 where the boundary is a little farther.
-    """
-
-    crack: int
-    tip: int
-    x: tuple[float, ...]
-    name: str
-    ligament: float
-    part: float
-    end: int = -1
-    label: str = ""
+# An arrival whose cycles are not known yet, and the part of an advance until then; above 1 where
+# the boundary is a little farther.
+Arriving = tuple[Arrival, float]
 
 
 def coming_arrivals(step: Step, problem: Problem) -> list[Arriving]:
@@ -152,10 +132,10 @@ def coming_arrivals(step: Step, problem: Problem) -> list[Arriving]:
         result = _arriving_fronts(scaled_step, plan.apart, placed_cracks, mesh)
     else:
         result = _arriving_fronts(step, plan.cracks, problem.placed, mesh)
-    return [_with_identity(step, arrival) for arrival in result]
+    return [(_with_identity(step, arrival), part) for arrival, part in result]
 
 
-def _with_identity(step: Step, arrival: Arriving) -> Arriving:
+def _with_identity(step: Step, arrival: Arrival) -> Arrival:
     """The same with the identity of the end."""
     if step.identities is None:
         return arrival
@@ -167,29 +147,6 @@ def _with_identity(step: Step, arrival: Arriving) -> Arriving:
         return arrival
     end = ends[arrival.crack][number]
     return replace(arrival, end=end, label=step.identities.names[end])
-
-
-def arrivals_of(
-    rule: GrowthRule, step: Step, arrivals_ahead: Sequence[Arriving], end_rate: float | None
-) -> tuple[Arrival, ...]:
-    """When places come to the boundary.
-
-    Parameters
-    ----------
-    rule : GrowthRule
-    step : Step
-        Before the advance.
-    arrivals_ahead : sequence of Arriving
-    end_rate : float, optional
-        Cycles of the whole advance, where it was solved.
-    """
-    integrator, mesh = integrator_of(rule), rule.problem.mesh
-    result = []
-    for a in arrivals_ahead:
-        N = step.cycles + integrator.cycles_until(rule, step, a.part, end_rate)
-        x = tuple(0.0 if abs(v) < _ROUND_OFF * mesh.extent else v for v in a.x)
-        result.append(Arrival(a.crack, a.tip, x, a.name, a.ligament, N, a.end, a.label))
-    return tuple(result)
 
 
 def have_left(cracks: Sequence[Crack], placed_cracks: Sequence[Crack]) -> bool:
@@ -221,7 +178,8 @@ def _arriving_tips(
             if hit is not None:
                 x, name = hit
                 ligament = float(np.linalg.norm(x - start[j]))
-                result.append(Arriving(c, j, tuple(x.tolist()), name, ligament, ligament / way))
+                arrival = Arrival(c, j, tuple(x.tolist()), name, ligament, np.nan)
+                result.append((arrival, ligament / way))
     return result
 
 
@@ -237,7 +195,7 @@ def _starts(step: Step, advanced_cracks: Sequence[Crack], c: int) -> Floats:
 
 
 def ended_crack(
-    advanced_crack: Crack, placed_crack: Crack, arrivals_ahead: Sequence[Arriving]
+    advanced_crack: Crack, placed_crack: Crack, arrivals_ahead: Sequence[Arrival]
 ) -> Crack:
     """A crack that has left the body, as it ends there: in 2D where it meets the boundary."""
     if placed_crack.fronts is not None:
@@ -268,7 +226,7 @@ def _arriving_fronts(
         x = start + np.minimum(part_inside, 1.0)[:, None] * move
         if _tips_outside(*pair):
             result += [
-                Arriving(c, place, tuple(y.tolist()), name_at(y), way, part)
+                (Arrival(c, place, tuple(y.tolist()), name_at(y), way, np.nan), part)
                 for place, y, way, part in _last_out(start, move, part_inside, body)
             ]
             continue
@@ -288,7 +246,8 @@ def _arriving_fronts(
             place = int(np.argmin(np.where(is_out, part_inside, np.inf) if is_out.any() else gap))
             place_out, part = (x[place], float(part_inside[place])) if is_out.any() else (end, 1.0)
             way = float(np.linalg.norm(place_out - start[place]))
-            result.append(Arriving(c, place, tuple(place_out.tolist()), name, way, part))
+            arrival = Arrival(c, place, tuple(place_out.tolist()), name, way, np.nan)
+            result.append((arrival, part))
     return result
 
 
@@ -330,7 +289,6 @@ def _parts(start: Floats, move: Floats, body: Body) -> Floats:
 
 __all__ = [
     "Arriving",
-    "arrivals_of",
     "coming_arrivals",
     "cut_off",
     "ended_crack",

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct, idct
 
-from xcrack.base.arrays import Floats
+from xcrack.base.arrays import Bools, Floats
 from xcrack.crack.front_chain import along_front
 from xcrack.sif.sif import SIF
 
@@ -192,7 +192,7 @@ _FEWEST_OF_A_WAVE = 8  # places of a front
 _MIXED = 3.0  # times its noise, from which on K_II is an answer that a filter would only bend
 
 
-def without_noise(sif: SIF, angle: Floats, is_closed: Floats, length: Floats) -> Floats:
+def without_noise(sif: SIF, angle: Floats, is_closed: Bools, length: Floats) -> Floats:
     """Kink angles along all fronts of a crack by a Wiener filter in wave number.
 
     Parameters
@@ -200,10 +200,9 @@ def without_noise(sif: SIF, angle: Floats, is_closed: Floats, length: Floats) ->
     sif : SIF
         Of the state with the largest K_I.
     angle : (f,) array, rad
-    is_closed : (k,) array of bool
-        Of each front.
-    length : (k,) array, length
-        Of each front.
+    is_closed : (f,) array of bool
+    length : (f,) array, length
+        Of the front of each place.
 
     Returns
     -------
@@ -226,8 +225,9 @@ def without_noise(sif: SIF, angle: Floats, is_closed: Floats, length: Floats) ->
         if np.sqrt((sif.K_II[rows] ** 2).mean()) > _MIXED * np.sqrt((noise**2).mean()):
             continue
         error = 2 * noise / np.maximum(K_I, 0.3 * K_I.max())
+        first = rows[0]
         result[rows] = _filtered_angle(
-            sif.s[rows], angle[rows], error, bool(is_closed[number]), float(length[number])
+            sif.s[rows], angle[rows], error, bool(is_closed[first]), float(length[first])
         )
     return result
 

@@ -15,8 +15,7 @@ from xcrack.base.arrays import Floats, Ints
 from xcrack.base.errors import GeometryError
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.crack import Crack
-from xcrack.crack.front_curve import front_curve
-from xcrack.crack.fronts import Front, closed_fronts, front_frames
+from xcrack.crack.fronts import Front, closed_fronts, front_curve, front_frames
 from xcrack.crack.measures import crack_size
 from xcrack.crack.placing_3d import place_arm, place_arms
 from xcrack.crack.stations import front_in_body, inside_body, place_crack
@@ -25,7 +24,6 @@ from xcrack.fatigue.retardation import (
     BlockCycles,
     CycleIntegration,
     OverloadZones,
-    march,
     no_zones,
 )
 from xcrack.growth.front_filter import (
@@ -45,8 +43,8 @@ from xcrack.growth.interfaces import (
     whole_front_ahead,
 )
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.rates import Rates, block_order, kinds_of
-from xcrack.growth.solves import SolveHistory
+from xcrack.growth.rates import Rates, kinds_of
+from xcrack.growth.solves import SolveHistory, cycle_by_cycle
 from xcrack.growth.stations import GrowthStations, Identities, directions
 from xcrack.growth.step import Corrected, Plan, Step, StepError, plan_of, solves_of
 from xcrack.growth.step_length import first_control, longest_advance, next_control, share_left
@@ -131,7 +129,7 @@ def _closed_fronts(part: GrowthStations) -> list[bool]:
     return result
 
 
-def front_lengths(crack: Crack) -> Floats:
+def _front_lengths(crack: Crack) -> Floats:
     """Length of each front along its curve, as places of K are measured, length."""
     return np.array([_arcs_of_vertices(front)[-1] for front in front_frames(crack)])
 
@@ -144,21 +142,16 @@ def _arcs_of_vertices(front: Front) -> Floats:
 # Stations and solves of the cracks as they were solved, and as they are corrected.
 
 
-def _solved_fronts(
-    rule: GrowthRule, rates: Rates, identities: Identities, sigma: float
-) -> tuple[GrowthStations, SolveHistory]:
-    """Stations and solves of all fronts at which K was solved."""
-    at = rates.stations
-    n = len(at)
-    angle, is_closed, length = np.zeros(n), np.zeros(n, dtype=bool), np.zeros(n)
+def solved_ends(rates: Rates, identities: Identities) -> GrowthStations:
+    """Ends of all cracks as K was solved there: nothing waits."""
+    at, n = rates.stations, len(rates.stations)
+    is_closed, length = np.zeros(n, dtype=bool), np.zeros(n)
     for c, crack in enumerate(rates.cracks):
-        rows = at.crack == c
-        is_closed_front, lengths = np.array(closed_fronts(crack), dtype=bool), front_lengths(crack)
-        states = [state[c] for state in rates.sif]
-        most_open = max(states, key=lambda sif: sif.K_I.max(initial=-np.inf))
-        angle[rows] = without_noise(most_open, rates.angle[rows], is_closed_front, lengths)
-        is_closed[rows], length[rows] = is_closed_front[at.front[rows]], lengths[at.front[rows]]
-    stations = GrowthStations(
+        if crack.fronts is not None:
+            rows = at.crack == c
+            is_closed[rows] = np.array(closed_fronts(crack), dtype=bool)[at.front[rows]]
+            length[rows] = _front_lengths(crack)[at.front[rows]]
+    return GrowthStations(
         crack=at.crack,
         front=at.front,
         s=at.s,
@@ -170,12 +163,28 @@ def _solved_fronts(
         offset=np.zeros_like(at.x),
         fresh=np.zeros(n, dtype=bool),
     )
+
+
+def _solved_fronts(
+    rule: GrowthRule, rates: Rates, identities: Identities, sigma: float
+) -> tuple[GrowthStations, SolveHistory]:
+    """Stations and solves of all fronts at which K was solved."""
+    stations = solved_ends(rates, identities)
+    n, angle = len(stations), np.zeros(len(stations))
+    for c in range(len(rates.cracks)):
+        rows = stations.crack == c
+        most_open = max(
+            (state[c] for state in rates.sif), key=lambda sif: sif.K_I.max(initial=-np.inf)
+        )
+        angle[rows] = without_noise(
+            most_open, rates.angle[rows], stations.closed[rows], stations.length[rows]
+        )
     solves = SolveHistory(
         sigma=np.array([sigma]),
         rate=rates.law_rate[None],
         dK_eq=rates.dK_eq[None],
-        direction=directions(at.frame, angle)[None],
-        scale=np.array(rates.problem.sizes)[at.crack],
+        direction=directions(stations.frame, angle)[None],
+        scale=np.array(rates.problem.sizes)[stations.crack],
         bend=np.zeros(n),
         exponent=rates.exponent(rule.law),
         kinds=kinds_of(rule, rates),
@@ -203,7 +212,7 @@ def _corrected_part(
     rate = _values_beside(stations_here, solves.rate[0], x, mesh)
     has_rate = ~np.isnan(rate)
     x, number = x[has_rate], number[has_rate]
-    lengths = front_lengths(crack)
+    lengths = _front_lengths(crack)
     part = GrowthStations(
         crack=np.full(len(x), c),
         front=number,
@@ -341,10 +350,12 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
     growth = stations.growth(rate, length)
     is_growing = growth >= WAITS_BELOW * cell
     way = _arcs(step, np.where(is_growing, growth, 0.0))
-    interfaces = whole_front_ahead(rule, stations.x, _move(stations, _angle(stations, solves), way))
-    if (
-        interfaces is not None and (way > interfaces.stop).any()
-    ):  # it ends before an interface, or behind
+    interfaces = None
+    if rule.has_interfaces:
+        move = _move(stations, _angle(stations, solves), way)
+        interfaces = whole_front_ahead(rule, stations.x, move)
+    # It ends before an interface, or behind.
+    if interfaces is not None and (way > interfaces.stop).any():
         is_beyond = way > interfaces.stop
         share, passes = (
             interfaces.goal[is_beyond] / way[is_beyond],
@@ -681,6 +692,8 @@ def _cycles(rule: GrowthRule, step: Step, rates: Rates) -> tuple[float, float]:
 
 def cycles_of_passage(rule: GrowthRule, step: Step, rates: Rates) -> float | None:
     """Cycles of a step in which the fastest place has passed an interface; None elsewhere."""
+    if not rule.has_interfaces:
+        return None
     plan, (stations, solves) = plan_of(step), solves_of(step)
     interfaces, row = whole_front_ahead(rule, stations.x, plan.move), plan.tip
     if interfaces is None or not plan.arc[row] > interfaces.way[row]:
@@ -860,20 +873,7 @@ def _growth_ahead(
     safe_ratio = np.where(is_even, 2.0, ratio)
     x = np.where(is_even, t, np.log1p(t * (safe_ratio - 1)) / np.log(safe_ratio))
     nodes = np.repeat(np.arange(float(len(kinds)))[:, None], len(ratio), axis=1)
-    return march(
-        rule.law,
-        rule.retardation,
-        block_order(rule),
-        cycles,
-        nodes,
-        x,
-        zones,
-        length,
-        exponent=solves.exponent,
-        threshold=rule.threshold,
-        blocks=blocks,
-        names=[name for name, _ in rule.problem.elasticity.named],
-    )
+    return cycle_by_cycle(rule, cycles, nodes, x, zones, length, solves.exponent, blocks)
 
 
 __all__ = [
@@ -886,10 +886,10 @@ __all__ = [
     "cycles_of_passage",
     "cycles_until",
     "ends_of",
-    "front_lengths",
     "interpolate_along_front",
     "partly_advanced",
     "predict",
     "rate_at_end",
+    "solved_ends",
     "zones_onto",
 ]

@@ -89,8 +89,6 @@ def interfaces_ahead(rule: GrowthRule, x: Floats, move: Floats) -> InterfacesAhe
         How far they would come.
     """
     elasticity = rule.problem.elasticity
-    if len(elasticity.named) < 2:
-        return None
     mesh, kinds = rule.problem.mesh, _kinds(rule)
     cell_0, cell_1 = mesh.facet_to_cell.T
     of_cell = kinds[elasticity.set_number]

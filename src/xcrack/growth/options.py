@@ -243,6 +243,11 @@ class GrowthRule:
                 return
 
     @property
+    def has_interfaces(self) -> bool:
+        """Whether the body has several materials."""
+        return len(self.problem.elasticity.named) > 1
+
+    @property
     def estimates(self) -> bool:
         """Whether K has error bars, which its growth is held against."""
         return self.tolerance is not None

@@ -3,10 +3,11 @@
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import replace
 from math import inf, sqrt
-from typing import Unpack
+from typing import Protocol, Unpack
 
 import numpy as np
 
+from xcrack.base.arrays import Floats
 from xcrack.base.checks import build_without_checks, copy_without_checks
 from xcrack.base.errors import GeometryError, ProblemError, XcrackError, warn
 from xcrack.crack.measures import crack_size
@@ -16,8 +17,8 @@ from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law, LawSets
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth import joins_3d
-from xcrack.growth.alarms import alarm_of_energy, alarm_of_life, alarms_of_step, validity_of
+from xcrack.growth import euler, fronts, joins_3d, tips
+from xcrack.growth.alarms import alarm_of_energy, alarm_of_life, judged_step
 from xcrack.growth.cells import at_step, bars_are_foretold, begin, follow, plan_again
 from xcrack.growth.ends import (
     beyond_end,
@@ -32,7 +33,6 @@ from xcrack.growth.ends import (
 )
 from xcrack.growth.events import (
     Arriving,
-    arrivals_of,
     coming_arrivals,
     cut_off,
     ended_crack,
@@ -41,7 +41,6 @@ from xcrack.growth.events import (
     piece_cut_off,
     with_joins,
 )
-from xcrack.growth.integrator import integrator_of
 from xcrack.growth.levels import (
     load_factor_at,
     respond_to_states,
@@ -50,11 +49,14 @@ from xcrack.growth.levels import (
 )
 from xcrack.growth.options import GrowthOptions, GrowthRule, lists_options, run_of
 from xcrack.growth.progress import Progress, WarningLog
-from xcrack.growth.rates import check_choice, rates_of, warn_of_left_out
+from xcrack.growth.rates import Rates, check_choice, rates_of, warn_of_left_out
 from xcrack.growth.response import Response, best_K
 from xcrack.growth.stations import Identities, first_identities, identities_after, split
 from xcrack.growth.step import (
+    Arrival,
+    Corrected,
     Join,
+    Plan,
     RunState,
     Step,
     numbers_after,
@@ -222,7 +224,7 @@ def grow(
 
 def first_step(rule: GrowthRule) -> Step:
     """The first step of a run alone, on the mesh as it is."""
-    return _solved_step(rule, rule.problem, None, SolverState(), {})[0]
+    return _solved_step(rule, rule.problem, None, SolverState())[0]
 
 
 def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator[Step, None, str]:
@@ -244,7 +246,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
     try:
         if last_step is None:
             with notices.watch(0) as messages:
-                first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
+                first, reuse = _solved_step(rule, rule.problem, None, SolverState())
                 count = len(messages)
                 restart = None
                 if not nothing_grows(rule, first):  # where nothing does, no mesh is fine enough
@@ -252,12 +254,13 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                 if restart is not None:
                     rule = restart[0]
                     del messages[:count]  # of a mesh that is not used
-                    first, reuse = _solved_step(rule, rule.problem, None, SolverState(), settings)
+                    first, reuse = _solved_step(rule, rule.problem, None, SolverState())
                 _warn_of_ratio(rule, first)
                 _warn_of_left_out(rule, first)
                 is_torn = _warn_of_mode_III(rule, first)
                 first = _with_validity(rule, first)
-            last_step = copy_without_checks(first, warnings=tuple(messages))
+            run = replace(run_state(first), settings=settings)
+            last_step = copy_without_checks(first, warnings=tuple(messages), run=run)
             progress.step(last_step)
             yield last_step
         else:
@@ -267,7 +270,8 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
             if end:
                 _refuse(last_step, end)
                 break
-            kink = kink or _warned_of_kink(rule, last_step)
+            if not kink and (kink := short_kink(rule, last_step)):
+                warn(kink)
             with notices.watch(last_step.index + 1) as messages:
                 cut = last_step if rule.max_size is None else _cut_at_size(rule, last_step)
                 next_rule = rule if rule.cells is None else follow(first_rule, rule, cut)
@@ -456,21 +460,12 @@ def _refuse(step: Step, end: str) -> None:
         warn(end)
 
 
-def _warned_of_kink(rule: GrowthRule, step: Step) -> str:
-    kink = short_kink(rule, step)
-    if kink:
-        warn(kink)
-    return kink
-
-
 def _with_validity(rule: GrowthRule, step: Step) -> Step:
     """A step with how far elasticity holds at it; warns of what is beyond its limit."""
-    if not step.has_left:  # by the material alone: a K_c of the run only says where it ends
-        K_c = rule.problem.elasticity.material.K_c
-        step = copy_without_checks(step, validity=validity_of(rule, step, K_c))
-    for alarm in alarms_of_step(rule, step):
+    validity, alarms = judged_step(rule, step)
+    for alarm in alarms:
         warn(str(alarm))
-    return step
+    return copy_without_checks(step, validity=validity)
 
 
 def _warn_of_left_out(rule: GrowthRule, first: Step) -> None:
@@ -504,10 +499,8 @@ def _step_after(
     if end:
         return None, reuse, end
     try:
-        step, reuse = _solved_step(
-            rule, problem, last_step, reuse, run_state(last_step).settings, joins_of_step
-        )
-        arrivals = arrivals_of(rule, last_step, arrivals_ahead, step.cycles - last_step.cycles)
+        step, reuse = _solved_step(rule, problem, last_step, reuse, joins_of_step)
+        arrivals = _arrivals(rule, last_step, arrivals_ahead, step.cycles - last_step.cycles)
         return copy_without_checks(step, arrivals=arrivals), reuse, ""
     except GeometryError as error:
         return None, reuse, cannot_go_on(last_step, error)
@@ -517,7 +510,7 @@ def _step_after(
             if not piece:
                 raise
             return None, reuse, f"{piece}, after step {last_step.index}, N = {last_step.cycles:.6g}"
-        words = left_the_body(rule, arrivals_of(rule, last_step, arrivals_ahead, None))
+        words = left_the_body(rule, _arrivals(rule, last_step, arrivals_ahead))
         return None, reuse, f"{words}, and the body cannot be solved without it: {error}"
 
 
@@ -528,7 +521,55 @@ def _scene(rule: GrowthRule, step: Step) -> Problem:
     return problem
 
 
+# How cracks go from one step to the next: the choice of an integrator.
+
+
+class Integrator(Protocol):
+    """What a run asks of an integrator; `euler`, `tips` and `fronts` have it."""
+
+    def begin(self, rule: GrowthRule, rates: Rates, identities: Identities) -> Corrected:
+        """The first step of a run."""
+
+    def correct(
+        self, rule: GrowthRule, step: Step, rates: Rates, identities: Identities
+    ) -> Corrected:
+        """What the cracks after an advance mean for the cycles and for the next advance."""
+
+    def predict(self, rule: GrowthRule, step: Step) -> Plan:
+        """What comes after a step."""
+
+    def ends_of(self, step: Step, plan: Plan) -> Floats:
+        """Where the ends of the cracks at the stations come to `(n, d)`."""
+
+    def advance_of(self, step: Step, plan: Plan, rates: Rates) -> Floats:
+        """Advance to the next step at the stations that were solved `(n,)`, length."""
+
+    def cycles_until(
+        self, rule: GrowthRule, step: Step, part: float, end_rate: float | None
+    ) -> float:
+        """Cycles of a part of the advance after a step, of which the whole takes `end_rate`.
+
+        As the last solves see it, where no solve after it says what the whole takes.
+        """
+
+
+def integrator_of(rule: GrowthRule) -> Integrator:
+    """The integrator of a run."""
+    return _INTEGRATORS[rule.integrator, rule.problem.mesh.dim]
+
+
+_INTEGRATORS: dict[tuple[str, int], Integrator] = {
+    ("euler", 2): euler,
+    ("euler", 3): euler,
+    ("pec", 2): tips,
+    ("pec", 3): fronts,
+}
+
+
+# A step.
+
 _AGREES = 40  # times, until loads and cycles of a solve agree
+_ROUND_OFF = 1e-12  # of the body: a place as near to zero is zero
 
 
 def _solved_step(
@@ -536,7 +577,6 @@ def _solved_step(
     problem: Problem,
     last_step: Step | None,
     reuse: SolverState,
-    settings: Mapping[str, str],
     joins_of_step: Sequence[Join] = (),
     may_foretell: bool = True,
 ) -> tuple[Step, SolverState]:
@@ -549,16 +589,12 @@ def _solved_step(
     if may_foretell and last_step is not None and bars_are_foretold(rule, last_step):
         if rule.max_steps is not None and last_step.index + 2 >= rule.max_steps:
             # The last step has bars of its own; of a run that goes on it is one among others.
-            step, handed_on = _solved_step(
-                rule, problem, last_step, reuse, settings, joins_of_step, False
-            )
+            step, handed_on = _solved_step(rule, problem, last_step, reuse, joins_of_step, False)
             return _with_mark(step), handed_on
         response = respond_to_states(rule, problem, reuse)
         with_bars = foretold_bars(last_step.sif, response.sif)
         if with_bars is None:
-            return _solved_step(
-                rule, problem, last_step, response.reuse, settings, joins_of_step, False
-            )
+            return _solved_step(rule, problem, last_step, response.reuse, joins_of_step, False)
         response, is_foretold = replace(response, sif=with_bars), True
     elif rule.load_program is None:
         response = respond_to_states(rule, problem, reuse, rule.estimates)
@@ -619,7 +655,7 @@ def _solved_step(
         earlier_zones=result.earlier_zones,
         control=result.control,
         run=RunState(
-            settings,
+            {} if last_step is None else run_state(last_step).settings,
             handed_on.without_matrices(),
             radius,
             rule.cells,
@@ -628,9 +664,7 @@ def _solved_step(
     )
     step = _with_plan(rule, step)
     if is_foretold and (step.plan is None or step.plan.limit or end_of_run(rule, step)):
-        step, handed_on = _solved_step(
-            rule, problem, last_step, handed_on, settings, joins_of_step, False
-        )
+        step, handed_on = _solved_step(rule, problem, last_step, handed_on, joins_of_step, False)
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)
     return copy_without_checks(step, da=rates.split(da)), handed_on
@@ -670,9 +704,9 @@ def _last_step(
     Its cycles are those of the last tip.
     """
     plan = plan_of(step)
-    arrivals = arrivals_of(rule, step, arrivals_ahead, None)
+    arrivals = _arrivals(rule, step, arrivals_ahead)
     cracks = tuple(
-        ended_crack(planned_crack, placed_crack, [a for a in arrivals_ahead if a.crack == c])
+        ended_crack(planned_crack, placed_crack, [a for a, _ in arrivals_ahead if a.crack == c])
         for c, (planned_crack, placed_crack) in enumerate(
             zip(plan.cracks, problem.placed, strict=True)
         )
@@ -705,6 +739,21 @@ def _last_step(
         identities=_identities(rule, step, problem, joins_of_step),
         run=step.run,
     )
+
+
+def _arrivals(
+    rule: GrowthRule, step: Step, arrivals_ahead: Sequence[Arriving], end_rate: float | None = None
+) -> tuple[Arrival, ...]:
+    """When ends come to the boundary in the advance after a step.
+
+    With the cycles of the whole advance, where it was solved.
+    """
+    integrator, mesh, result = integrator_of(rule), rule.problem.mesh, []
+    for arrival, part in arrivals_ahead:
+        N = step.cycles + integrator.cycles_until(rule, step, part, end_rate)
+        x = tuple(0.0 if abs(v) < _ROUND_OFF * mesh.extent else v for v in arrival.x)
+        result.append(replace(arrival, x=x, cycles=N))
+    return tuple(result)
 
 
 def _without_stations(sif: SIF) -> SIF:

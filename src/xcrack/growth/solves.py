@@ -415,21 +415,39 @@ def stretch_of(
     if zones is not None:
         grid = np.linspace(0.0, length, POINTS)
         assert solves.kinds is not None
-        integration = march(
-            rule.law,
-            rule.retardation,
-            block_order(rule),
-            solves.kinds,
-            np.log(solves.scale + solves.sigma[:, None]),
-            np.log(solves.scale + start + grid[:, None]),
-            zones,
-            length,
-            exponent=solves.exponent,
-            threshold=rule.threshold,
-            blocks=blocks,
-            names=[name for name, _ in rule.problem.elasticity.named],
+        nodes = np.log(solves.scale + solves.sigma[:, None])
+        x = np.log(solves.scale + start + grid[:, None])
+        integration = cycle_by_cycle(
+            rule, solves.kinds, nodes, x, zones, length, solves.exponent, blocks
         )
     return Stretch(solves, start, length, rule.threshold, integration)
+
+
+def cycle_by_cycle(
+    rule: GrowthRule,
+    kinds: BlockCycles,
+    nodes: Floats,
+    x: Floats,
+    zones: OverloadZones,
+    length: float,
+    exponent: float,
+    blocks: float,
+) -> CycleIntegration:
+    """Growth after overloads by law and retardation of a run, as of `march`."""
+    return march(
+        rule.law,
+        rule.retardation,
+        block_order(rule),
+        kinds,
+        nodes,
+        x,
+        zones,
+        length,
+        exponent=exponent,
+        threshold=rule.threshold,
+        blocks=blocks,
+        names=[name for name, _ in rule.problem.elasticity.named],
+    )
 
 
 __all__ = [
@@ -438,6 +456,7 @@ __all__ = [
     "SolveHistory",
     "Stretch",
     "bisected_length",
+    "cycle_by_cycle",
     "lagrange",
     "rates_at",
     "stretch_of",

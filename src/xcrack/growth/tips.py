@@ -93,7 +93,8 @@ def predict(rule: GrowthRule, step: Step) -> Plan:
         return Plan.at_rest(step, cell)
     stretch, stops = _piece_ahead(rule, step)
     growth = _growth(stations, stretch)
-    interfaces = interfaces_ahead(rule, stations.x, growth.move)
+    has_interfaces = rule.has_interfaces
+    interfaces = interfaces_ahead(rule, stations.x, growth.move) if has_interfaces else None
     if interfaces is not None and (growth.arc > interfaces.stop).any():
         stretch, growth = _up_to_interfaces(rule, step, interfaces, stretch, growth)
     else:
@@ -496,9 +497,10 @@ def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) 
         return _without_lost_tips(rule, step, rates, identities, rows)
     if np.isinf(rates.rate).any():
         return _last_step_of_run(step, rates, identities)
-    interfaces = interfaces_ahead(rule, solves_of(step)[0].x, plan.move)
-    if interfaces is not None and (plan.arc > interfaces.way).any():
-        return _step_through_interface(rule, step, rates, identities, interfaces)
+    if rule.has_interfaces:
+        interfaces = interfaces_ahead(rule, solves_of(step)[0].x, plan.move)
+        if interfaces is not None and (plan.arc > interfaces.way).any():
+            return _step_through_interface(rule, step, rates, identities, interfaces)
     return _corrected_points(rule, step, rates, identities)
 
 

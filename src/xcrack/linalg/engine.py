@@ -12,7 +12,14 @@ from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.fem.assembly import Bulk, Stiffness
 from xcrack.linalg.multifrontal import Factor, Tree
 from xcrack.linalg.multigrid import Hierarchy
+from xcrack.model.problem import Problem
 
+# Unknowns of a 3D body above which a factorisation costs more, by order (measured).
+_DIRECT = {1: 4_000, 2: 8_000}
+# With friction conjugate gradients solve once for each row of pressure and shear: at 4 800 unknowns
+# of order 1 a factor takes a seventh of their time, at 17 000 of order 2 a seventeenth, and beyond
+# these unknowns more than 1.4 GB.
+_DIRECT_WITH_FRICTION = 50_000
 _SAME = 1e-15  # share of the largest entry up to which vectors are multiples of each other
 
 
@@ -289,4 +296,29 @@ def proportional_columns(b: Floats, tolerance: float = _SAME) -> tuple[Ints, Flo
     return first, scale
 
 
-__all__ = ["CondensedSystem", "ContactRows", "Engine", "SolveCount", "StateContact"]
+def takes_iterations(problem: Problem, n: int) -> bool:
+    """Whether a system of n unknowns is solved by conjugate gradients."""
+    linear_solver = problem.numerics.linear
+    if linear_solver != "auto":
+        return linear_solver == "iterative"
+    n_direct = _DIRECT_WITH_FRICTION if may_rub(problem) else _DIRECT[problem.order or 1]
+    is_large = problem.mesh.dim == 3 and n > n_direct
+    if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
+        return False  # quadratic functions of both cracks nearly vanish together beside a junction
+    return is_large and problem.numerics.contact_method is None  # others change the matrix
+
+
+def may_rub(problem: Problem) -> bool:
+    """Whether crack faces have friction."""
+    return problem.contact != "off" and any(problem.frictions)
+
+
+__all__ = [
+    "CondensedSystem",
+    "ContactRows",
+    "Engine",
+    "SolveCount",
+    "StateContact",
+    "may_rub",
+    "takes_iterations",
+]

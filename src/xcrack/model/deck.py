@@ -33,8 +33,10 @@ from xcrack.model.deck_body import DeckBody
 from xcrack.model.deck_state import Coupling, DeckState, SpreadLoad, chosen_step, steps_of
 from xcrack.model.loads import (
     Load,
+    Support,
     body_force,
     displacement,
+    fix,
     initial_stress,
     point_force,
     pressure,
@@ -44,7 +46,6 @@ from xcrack.model.loads import (
 )
 from xcrack.model.material import Material
 from xcrack.model.problem import Problem
-from xcrack.model.supports import Support, fix
 
 _MATERIAL = {
     "MATERIAL": "materials",

@@ -34,10 +34,9 @@ from xcrack.crack.placing_3d import ShortFront
 from xcrack.crack.stations import GEOMETRY, Stations, placement_of, stations_of
 from xcrack.mesh.mesh import Mesh, warn_of_sets
 from xcrack.model.elasticity import Elasticity, elasticity
-from xcrack.model.loads import Load
+from xcrack.model.loads import Load, Support
 from xcrack.model.material import Material, MaterialSets
 from xcrack.model.numerics import Numerics
-from xcrack.model.supports import Support
 
 
 class ReferenceK(Declared):

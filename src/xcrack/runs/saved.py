@@ -28,10 +28,10 @@ from xcrack.linalg.engine import SlipField, SolverState
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.polygon import Arc
+from xcrack.model.loads import Condition
 from xcrack.model.material import Material, MaterialSets, StoredFunction
 from xcrack.model.numerics import Numerics
 from xcrack.model.problem import LoadLevel, LoadState, Problem
-from xcrack.model.supports import Condition
 from xcrack.runs import run_folder, store
 from xcrack.runs.history import History
 from xcrack.runs.step_arrays import (

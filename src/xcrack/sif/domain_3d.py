@@ -11,7 +11,7 @@ from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints, at, lock
 from xcrack.base.errors import warn
 from xcrack.base.machine import stream_tasks
-from xcrack.crack.front_curve import FootPoints, FrontCurve
+from xcrack.crack.fronts import FootPoints, FrontCurve
 from xcrack.crack.junctions_3d import are_opposite
 from xcrack.crack.stations import FrontInBody, front_in_body, inside_body
 from xcrack.fem.function_space import Tip

@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints, at
 from xcrack.base.errors import GeometryError, warn
-from xcrack.crack.front_curve import FrontCurve
+from xcrack.crack.fronts import FrontCurve
 from xcrack.mesh.locate import cells_at
 from xcrack.model.elasticity import Elasticity
 from xcrack.model.material import Isotropic

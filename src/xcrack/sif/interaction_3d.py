@@ -21,7 +21,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from xcrack.base.arrays import Bools, Floats, Ints
-from xcrack.crack.front_curve import FootPoints, FrontCurve
+from xcrack.crack.fronts import FootPoints, FrontCurve
 from xcrack.fem.williams import continued_polar
 from xcrack.model.material import Isotropic
 

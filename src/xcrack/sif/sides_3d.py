@@ -13,13 +13,13 @@ import numpy as np
 
 from xcrack.analysis.solution import Solution, gradients_at
 from xcrack.base.arrays import Bools, Floats
-from xcrack.crack.front_curve import FootPoints, FrontCurve
+from xcrack.crack.fronts import FootPoints, FrontCurve
 from xcrack.fem.facets import part_points
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.loads import facet_points, outer_points, position
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.mesh.mesh import facet_set, numbers_of
-from xcrack.model.supports import Support
+from xcrack.model.loads import Support
 from xcrack.sif.common import initial_stresses, lip_pressure, lip_shear
 from xcrack.sif.front_materials import FrontMaterials
 from xcrack.sif.interaction_3d import hats, side_integrals

@@ -12,9 +12,8 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.lines import line_crack
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
-from xcrack.model.loads import Load, bearing, point_force, traction
+from xcrack.model.loads import Load, Support, bearing, point_force, traction
 from xcrack.model.problem import Problem
-from xcrack.model.supports import Support
 from xcrack.sif.handbook import HandbookK, handbook
 
 Length = Annotated[float, Number(above=0, unit=LENGTH)]

@@ -16,8 +16,8 @@ from xcrack.crack.crack import Crack
 from xcrack.crack.measures import Measures, measures
 from xcrack.crack.stations import GEOMETRY
 from xcrack.mesh.mesh import Mesh
+from xcrack.model.loads import Condition
 from xcrack.model.problem import Problem
-from xcrack.model.supports import Condition
 from xcrack.sif.sif import SIF
 from xcrack.view.report_source import Section, Source, UnitNames, setting_words
 

@@ -11,10 +11,9 @@ from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.power import paris
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
-from xcrack.model.loads import displacement
+from xcrack.model.loads import displacement, fix
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
 from xcrack.verification.experiments.experiment import Experiment, Trial, by_others, grown, outline
 from xcrack.verification.experiments.outcome import (
     Comparison,

@@ -12,10 +12,9 @@ from xcrack.fatigue.power import paris
 from xcrack.growth.step import Step
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.plates import plate
-from xcrack.model.loads import displacement
+from xcrack.model.loads import Support, displacement, fix
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import Support, fix
 from xcrack.runs.history import History
 from xcrack.verification.experiments.experiment import (
     ROOT_M,

@@ -10,10 +10,9 @@ from xcrack.crack.junctions_3d import arm
 from xcrack.crack.lines import line_crack
 from xcrack.crack.surfaces import plane_crack
 from xcrack.mesh.box import box
-from xcrack.model.loads import traction
+from xcrack.model.loads import fix, traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.book.scenes_2d import NU, E, perturbed

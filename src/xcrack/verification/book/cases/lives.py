@@ -15,10 +15,9 @@ from xcrack.fatigue.power import elber, paris, walker
 from xcrack.growth.run import grow
 from xcrack.growth.step import Step
 from xcrack.mesh.box import box
-from xcrack.model.loads import traction
+from xcrack.model.loads import fix, traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
 from xcrack.runs.collect import collect
 from xcrack.verification.book.case import Case, Value
 from xcrack.verification.exact import lives

@@ -8,10 +8,9 @@ import numpy as np
 from xcrack.analysis.solve import solve
 from xcrack.base.arrays import Floats
 from xcrack.crack.lines import line_crack
-from xcrack.model.loads import displacement
+from xcrack.model.loads import displacement, fix
 from xcrack.model.material import Graded, Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
 from xcrack.sif.interface_crack import interface_intensity
 from xcrack.sif.stress_intensity import energy_release_rate, stress_intensity
 from xcrack.verification.book import scenes_materials as scenes

@@ -13,10 +13,9 @@ from xcrack.crack.surfaces import elliptic_crack
 from xcrack.mesh.box import box
 from xcrack.mesh.fields import read_field
 from xcrack.mesh.plates import plate_with_hole
-from xcrack.model.loads import Load, bearing, displacement, resultant, traction
+from xcrack.model.loads import Load, bearing, displacement, fix, resultant, traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
 from xcrack.output.vtk import write
 from xcrack.sif.stress_intensity import stress_intensity
 from xcrack.verification.book.case import Case, Value

@@ -13,10 +13,9 @@ from xcrack.fatigue.power import paris
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth.run import grow
 from xcrack.mesh.box import box
-from xcrack.model.loads import traction
+from xcrack.model.loads import fix, traction
 from xcrack.model.material import Isotropic
 from xcrack.model.problem import Problem
-from xcrack.model.supports import fix
 from xcrack.runs.assessment import residual_strength
 from xcrack.runs.collect import collect
 from xcrack.runs.history import History
