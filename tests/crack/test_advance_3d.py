@@ -18,7 +18,7 @@ from xcrack.crack.front_chain import along_front
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.lines import crossing_points
 from xcrack.crack.measures import area_inside, front_length_inside, surface_size
-from xcrack.crack.placing_3d import place_surface
+from xcrack.crack.stations import place_crack
 from xcrack.growth.euler import elapsed_3d
 from xcrack.growth.fronts import interpolate_along_front
 from xcrack.mesh.locate import Body
@@ -521,7 +521,7 @@ def test_growth_in_a_body_until_the_front_has_left_it():
     """Placed again after each step: a closed front opens, splits at the faces, and is gone."""
     mesh = box((-1, -1, -1), (1, 1, 1), 12)
     body, size = Body.of(mesh), 0.6 * float(mesh.cell_size.min())
-    crack = place_surface(penny_crack((0.1, 0.2, 0.03), (0, 0, 1), 0.5), mesh)
+    crack = place_crack(penny_crack((0.1, 0.2, 0.03), (0, 0, 1), 0.5), mesh)
     kinds, area = [], []
     while crack.fronts and len(kinds) < 12:
         frames = front_frames(crack)
@@ -529,7 +529,7 @@ def test_growth_in_a_body_until_the_front_has_left_it():
         number = np.repeat(np.arange(len(frames)), [len(f.s) for f in frames])
         moved = advance_fronts(crack, s, number, 0 * s, np.full(len(s), 0.1), size, body)
         check(moved, crack)
-        crack = place_surface(moved, mesh)
+        crack = place_crack(moved, mesh)
         assert np.array_equal(crack.points[: len(moved.points)], moved.points)
         kinds.append(tuple(bool(f[0] == f[-1]) for f in crack.fronts))
         area.append(area_inside(crack, mesh))

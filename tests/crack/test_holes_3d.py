@@ -16,8 +16,7 @@ from support.rows import slow
 from xcrack import Crack, Mesh
 from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.measures import area_inside, front_ends
-from xcrack.crack.placing_3d import place_surface
-from xcrack.crack.stations import stations_of
+from xcrack.crack.stations import place_crack, stations_of
 from xcrack.mesh.gmsh_session import session
 from xcrack.mesh.locate import Body, cell_sizes
 from xcrack.mesh.triangulation import face_areas
@@ -78,7 +77,7 @@ def grown(crack: Crack, mesh: Mesh, da: float) -> Crack:
     even = np.ones(len(at.s))
     body = Body.of(mesh)
     moved = advance_fronts(crack, at.s, at.front, 0 * even, da * even, size, body)
-    placed = place_surface(moved, mesh)
+    placed = place_crack(moved, mesh)
     n = len(crack.points)
     assert np.array_equal(placed.points[:n], crack.points)
     assert np.array_equal(placed.faces[: len(crack.faces)], crack.faces)
@@ -108,7 +107,7 @@ def test_an_even_front_passes_a_hole(tmp_path, ratio, counts):
     radius, centre, start, da = ratio * H, -0.4, -0.4 - ratio * H - 0.12, 0.1
     mesh = block(tmp_path / "hole.msh", (centre, 0, -0.5, 1.0, radius))
     body = Body.of(mesh)
-    crack = place_surface(through_crack(start), mesh)
+    crack = place_crack(through_crack(start), mesh)
     grid = np.stack(np.meshgrid(np.arange(-1, 0.8, 0.004), np.arange(-HALF, HALF, 0.004)), -1)
     way, solid = shortest_way(grid.reshape(-1, 2) + 0.002, start, centre, radius)
     fronts = []
@@ -143,7 +142,7 @@ def test_blind_holes_cavities_and_several_holes(tmp_path, holes):
     """The front is whole behind them, has gained no more than its way, and no less area."""
     mesh = block(tmp_path / "holes.msh", *holes)
     body, start, da, steps = Body.of(mesh), holes[0][0] - 0.27, 0.1, 11
-    crack = place_surface(through_crack(start), mesh)
+    crack = place_crack(through_crack(start), mesh)
     area = [area_inside(crack, mesh)]
     counts = set()
     for step in range(1, steps + 1):
@@ -182,7 +181,7 @@ def test_small_holes_and_holes_at_an_angle(tmp_path, hole, section):
     """The front is nowhere ahead of its way, and the area is that of the way without the hole."""
     mesh = block(tmp_path / "hole.msh", hole, facets=8)
     body, start, da, steps = Body.of(mesh), -0.7, 0.1, 11
-    crack = place_surface(through_crack(start), mesh)
+    crack = place_crack(through_crack(start), mesh)
     before = area_inside(crack, mesh)
     for step in range(1, steps + 1):
         crack = grown(crack, mesh, da)
@@ -201,7 +200,7 @@ def test_a_front_passes_under_the_bottom_of_a_hole(tmp_path, ligament):
     a warning says so; at a cell they are within 4 %, and nothing is said.
     """
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, 0.011 + ligament, 0, 0, 1, 0.14), facets=8)
-    crack = place_surface(through_crack(-0.7), mesh)
+    crack = place_crack(through_crack(-0.7), mesh)
     before = area_inside(crack, mesh)
     for step in range(1, 8):
         crack = grown(crack, mesh, 0.1)
@@ -230,7 +229,7 @@ def test_points_that_stay_in_the_middle_of_a_side_keep_their_order(tmp_path):
     """A skew blind hole whose wall and bottom the front meets at once: refused in words."""
     hole = (-0.35809569, -0.035, -0.07393365, -0.92658734, -1.13745398, 0.31246489, 0.16069562)
     mesh = block(tmp_path / "hole.msh", hole, facets=8)
-    crack = grown(place_surface(through_crack(-0.85), mesh), mesh, 0.1)
+    crack = grown(place_crack(through_crack(-0.85), mesh), mesh, 0.1)
 
     def to_the_other_side():
         again = crack
@@ -251,7 +250,7 @@ def test_a_front_that_has_just_come_round_a_hole_is_whole(tmp_path):
     outline = np.array([(-3.0, -1.0), *line, (-3.0, 1.0)])
     plane = xc.plane_crack(np.column_stack([outline, np.full(len(outline), 0.011)]))
     front = np.arange(len(line), 0, -1)
-    placed = place_surface(Crack(plane.points, plane.faces, None, (front,)), mesh)
+    placed = place_crack(Crack(plane.points, plane.faces, None, (front,)), mesh)
     assert len(placed.fronts) == 1
     fresh = placed.points[len(plane.points) :]
     assert not Body.of(mesh).contains(fresh).any()
@@ -260,7 +259,7 @@ def test_a_front_that_has_just_come_round_a_hole_is_whole(tmp_path):
 def test_no_face_is_a_line_where_one_end_of_a_front_stays(tmp_path):
     """The end outside at y < -0.7 has no advance, while the front comes to a hole."""
     mesh = block(tmp_path / "hole.msh", (-0.4, 0.3, -0.5, 1.0, 0.1), facets=8)
-    crack = place_surface(through_crack(-0.55), mesh)
+    crack = place_crack(through_crack(-0.55), mesh)
     body = Body.of(mesh)
     for _ in range(3):
         at = stations_of([crack], mesh)
@@ -268,13 +267,13 @@ def test_no_face_is_a_line_where_one_end_of_a_front_stays(tmp_path):
         da = np.where(at.x[:, 1] > -0.5, 0.1, 0.0)
         crack = advance_fronts(crack, at.s, at.front, np.zeros(len(at.s)), da, size, body)
         assert face_areas(crack.points, crack.faces).min() > 1e-6
-        crack = place_surface(crack, mesh)
+        crack = place_crack(crack, mesh)
 
 
 @pytest.mark.parametrize("start", [-0.4, -0.35])
 def test_a_front_drawn_across_a_hole_goes_on_behind_it(tmp_path, start):
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, 0.25))
-    crack = place_surface(through_crack(start), mesh)
+    crack = place_crack(through_crack(start), mesh)
     assert len(crack.fronts) == 2
     body, before = Body.of(mesh), area_inside(crack, mesh)
     for step in range(1, 6):
@@ -290,7 +289,7 @@ def test_a_front_drawn_across_a_hole_goes_on_behind_it(tmp_path, start):
 def test_a_front_that_touches_a_hole_from_both_sides(tmp_path):
     """Just before and just behind it; discretisation is what facets cut off."""
     mesh = block(tmp_path / "hole.msh", (-0.4, 0.1, -0.5, 1.0, 0.2))
-    crack = place_surface(through_crack(-0.7), mesh)
+    crack = place_crack(through_crack(-0.7), mesh)
     for _ in range(6):
         crack = grown(crack, mesh, 0.1)
     assert len(crack.fronts) == 1
@@ -301,7 +300,7 @@ def test_a_front_that_touches_a_hole_from_both_sides(tmp_path):
 def test_ligaments_that_cells_do_not_resolve_are_named(tmp_path):
     """What is left beside the hole is two cells wide; half a one at each side does not count."""
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, 0.25), h=0.2)
-    crack = place_surface(through_crack(-0.75), mesh)
+    crack = place_crack(through_crack(-0.75), mesh)
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter("always", xc.XcrackWarning)
         while crack.fronts:
@@ -410,7 +409,7 @@ def test_K_beside_a_hole_smaller_than_a_cell_is_that_of_a_strip(tmp_path):
 def test_a_penny_opens_around_a_hole_and_leaves_the_block(tmp_path):
     """A closed front round a hole advances in the body alone; steps are those of circles."""
     mesh = block(tmp_path / "hole.msh", (-0.1, 0, -0.5, 1.0, 0.12))
-    crack = place_surface(xc.penny_crack((-0.1, 0, 0.011), (0, 0, 1), 0.3), mesh)
+    crack = place_crack(xc.penny_crack((-0.1, 0, 0.011), (0, 0, 1), 0.3), mesh)
     for step in range(4):
         exact = np.pi * ((0.3 + 0.1 * step) ** 2 - 0.12**2)
         assert area_inside(crack, mesh) == pytest.approx(exact, rel=0.02)
@@ -523,7 +522,7 @@ def test_an_even_front_covers_the_lens_of_two_circles(tmp_path, name):
     h, da = 0.06, 0.06
     mesh, at, radius = scene_at_notch(tmp_path, name, h)
     body = Body.of(mesh)
-    crack = place_surface(xc.penny_crack(at, (0, 0, 1), CRACK_DEPTH), mesh)
+    crack = place_crack(xc.penny_crack(at, (0, 0, 1), CRACK_DEPTH), mesh)
     for step in range(6):
         reach = CRACK_DEPTH + step * da
         inside = crack.points[body.contains(crack.points)]
@@ -538,7 +537,7 @@ def test_an_even_front_covers_the_lens_of_two_circles(tmp_path, name):
         size = 0.5 * float(cell_sizes(mesh, st.x).mean())
         even = np.ones(len(st.s))
         crack = advance_fronts(crack, st.s, st.front, 0 * even, da * even, size, body)
-        crack = place_surface(crack, mesh)
+        crack = place_crack(crack, mesh)
 
 
 def pulled(mesh, crack, order):

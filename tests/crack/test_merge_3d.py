@@ -13,7 +13,7 @@ from xcrack import Crack, GeometryError, box, penny_crack, plane_crack, surface_
 from xcrack.crack.front_chain import stitch_side
 from xcrack.crack.fronts import front_frames
 from xcrack.crack.merging import gap_between, merged_crack, turned_crack
-from xcrack.crack.placing_3d import place_surface
+from xcrack.crack.stations import place_crack
 from xcrack.mesh.distances import closest_in, triangle_tree
 from xcrack.mesh.locate import Body
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, oriented_faces
@@ -196,10 +196,10 @@ def test_two_cracks_from_one_side_meet_at_the_surface():
     mesh = box((-3, 0, -1), (3, 2, 1), (30, 10, 10))
     half = np.linspace(0, np.pi, 33)
     arc = np.stack([np.cos(half), np.sin(half), 0.013 + 0 * half], axis=1)
-    pair = [place_surface(plane_crack(arc + np.array([c, 0, 0])), mesh) for c in (-1.05, 1.05)]
+    pair = [place_crack(plane_crack(arc + np.array([c, 0, 0])), mesh) for c in (-1.05, 1.05)]
     both = merged_crack(*pair, 0.3, 0.1)
     assert len(both.fronts) == 1
-    placed = place_surface(both, mesh)
+    placed = place_crack(both, mesh)
     (front,) = placed.fronts
     ends = placed.points[front[[0, -1]]]
     assert front[0] != front[-1]
@@ -213,13 +213,13 @@ def test_two_straight_fronts_of_a_plate_vanish_together():
     """Through cracks: the fronts that face each other are gone, the others stay."""
     mesh = box((-3, 0, -1), (3, 1, 1), (30, 5, 10))
     pair = [
-        place_surface(
+        place_crack(
             plane_crack([(x0, -1, 0.013), (x1, -1, 0.013), (x1, 2, 0.013), (x0, 2, 0.013)]), mesh
         )
         for x0, x1 in ((-2.05, -0.05), (0.06, 1.98))
     ]
     assert [len(crack.fronts) for crack in pair] == [2, 2]
-    both = place_surface(merged_crack(*pair, 0.3, 0.1), mesh)
+    both = place_crack(merged_crack(*pair, 0.3, 0.1), mesh)
     x = sorted(both.points[front][:, 0].mean() for front in both.fronts)
     assert x == pytest.approx([-2.05, 1.98], abs=1e-12)
 

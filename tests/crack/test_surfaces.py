@@ -16,7 +16,7 @@ from xcrack import (
 )
 from xcrack.crack.boundary_trace import Body
 from xcrack.crack.fronts import front_frames
-from xcrack.crack.placing_3d import check_surfaces, place_surface
+from xcrack.crack.placing_3d import check_surfaces
 from xcrack.crack.stations import place_crack
 from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.triangulation import face_areas, face_normals, loops, rim, ruled_strip, side_keys
@@ -230,7 +230,7 @@ def check_fronts(crack, body, plane=True):
 
 
 def test_penny_inside_has_one_closed_front_clockwise(cube, body):
-    placed = place_surface(penny_crack((0, 0, 0), (0, 0, 1), 0.5), cube)
+    placed = place_crack(penny_crack((0, 0, 0), (0, 0, 1), 0.5), cube)
     assert check_fronts(placed, body) == [128]
     (front,) = placed.fronts
     assert front[0] == front[-1]
@@ -239,7 +239,7 @@ def test_penny_inside_has_one_closed_front_clockwise(cube, body):
 
 
 def test_half_penny_at_a_face_has_one_open_front(cube, body):
-    placed = place_surface(penny_crack((1, 0, 0.03), (0, 0, 1), 0.5), cube)
+    placed = place_crack(penny_crack((1, 0, 0.03), (0, 0, 1), 0.5), cube)
     (inside,) = check_fronts(placed, body)
     assert inside == pytest.approx(64, abs=2)
 
@@ -265,11 +265,11 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_fronts_are_open_and_led_outside(case, cube, body):
     crack, n_fronts = CASES[case]
-    placed = place_surface(crack, cube)
+    placed = place_crack(crack, cube)
     assert len(placed.fronts) == n_fronts
     assert all(front[0] != front[-1] for front in placed.fronts)
     assert all(count >= 3 for count in check_fronts(placed, body))
-    again = place_surface(placed, cube)
+    again = place_crack(placed, cube)
     np.testing.assert_array_equal(again.points, placed.points)
     np.testing.assert_array_equal(again.faces, placed.faces)
     for one, other in zip(again.fronts, placed.fronts, strict=True):
@@ -280,7 +280,7 @@ def test_a_small_crack_in_a_corner_is_followed_by_its_front_outside():
     """A front that left its outline at the sides went on at 45 degrees, and its ends ran ahead."""
     coarse = xc.box((-1, -1, -1), (1, 1, 1), 8)  # radius 1.85 cells
     corner = np.array([-1.0, -1.0, 0.04])
-    placed = place_surface(penny_crack(corner, (0, 0, 1), 0.8), coarse)
+    placed = place_crack(penny_crack(corner, (0, 0, 1), 0.8), coarse)
     (front,) = placed.fronts
     x = placed.points[front]
     depth, size = Body.of(coarse).depth(x)[0], Body.of(coarse).cell_size(x)
@@ -291,7 +291,7 @@ def test_a_small_crack_in_a_corner_is_followed_by_its_front_outside():
 
 
 def test_straight_front_ends_on_the_surface_and_goes_on_straight(cube):
-    placed = place_surface(rectangle(-1, 0.1, -1, 1), cube)
+    placed = place_crack(rectangle(-1, 0.1, -1, 1), cube)
     (front,) = front_frames(placed)
     np.testing.assert_allclose(front.x[:, [0, 2]], np.tile([0.1, 0.03], (len(front.x), 1)))
     np.testing.assert_allclose(front.frame[:, 0], np.tile([1, 0, 0], (len(front.x), 1)), atol=1e-14)
@@ -300,23 +300,23 @@ def test_straight_front_ends_on_the_surface_and_goes_on_straight(cube):
 
 def test_sides_of_the_outline_are_at_most_a_cell(cube, body):
     for crack in (rectangle(-3, 0.1, -5, 6), rectangle(-0.5, 0.6, -0.5, 0.4)):
-        placed = place_surface(crack, cube)
+        placed = place_crack(crack, cube)
         for front in front_frames(placed):
             size = body.cell_size(front.x)
             assert (np.diff(front.s) < size[1:]).all()
 
 
 def test_front_corners_are_rounded_and_mouth_corners_are_not(cube):
-    square = place_surface(plane_crack([(6 * x / 5, 6 * y / 5, z) for x, y, z in SQUARE]), cube)
+    square = place_crack(plane_crack([(6 * x / 5, 6 * y / 5, z) for x, y, z in SQUARE]), cube)
     (front,) = front_frames(square)
     radius = 0.45 * 1.2  # the room that corners 1.2 apart leave for arcs of 2 * 0.2887
     assert area_of(square) == pytest.approx(1.44 - (4 - np.pi) * radius**2, rel=0.02)
     turn = np.einsum("ij,ij->i", front.frame[:, 2], np.roll(front.frame[:, 2], 1, axis=0))
     assert turn.min() > np.cos(np.radians(25))
-    edge = place_surface(rectangle(-1.5, 0, -1.5, 1.5), cube)
+    edge = place_crack(rectangle(-1.5, 0, -1.5, 1.5), cube)
     assert len(front_frames(edge)[0].x) > 0
     assert {(-1.5, -1.5), (-1.5, 1.5)} <= {tuple(row) for row in edge.points[:, :2].tolist()}
-    corner = place_surface(rectangle(0, 2, 0, 2), cube)
+    corner = place_crack(rectangle(0, 2, 0, 2), cube)
     lost = 4 - area_of(corner)
     assert lost == pytest.approx((1 - np.pi / 4) * (2 * np.sqrt(3) / 6) ** 2, rel=0.1)
 
@@ -328,7 +328,7 @@ def test_curved_surface_is_placed(cube, body):
     k = np.arange(225).reshape(15, 15)
     a, b, c, d = (part.ravel() for part in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
     faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    placed = place_surface(surface_crack(points, faces), cube)
+    placed = place_crack(surface_crack(points, faces), cube)
     check_fronts(placed, body, plane=False)
     (front,) = front_frames(placed)
     inside = body.contains(front.x)
@@ -340,7 +340,7 @@ def test_two_pieces_and_a_hole(cube, body):
     """A ring has two closed fronts, the inner one the other way round."""
     disc = penny_crack((0, 0, 0.03), (0, 0, 1), 0.8)
     r = np.hypot(*disc.points[disc.faces].mean(axis=1)[:, :2].T)
-    placed = place_surface(surface_crack(disc.points, disc.faces[r > 0.35]), cube)
+    placed = place_crack(surface_crack(disc.points, disc.faces[r > 0.35]), cube)
     outer, inner = front_frames(placed)
     assert check_fronts(placed, body) == [len(outer.x), len(inner.x)]
     assert outer.is_closed
@@ -351,7 +351,7 @@ def test_two_pieces_and_a_hole(cube, body):
         np.vstack([disc.points * 0.4 + [0.5, 0, 0], disc.points * 0.4 - [0.5, 0, 0]]),
         np.vstack([disc.faces, disc.faces + len(disc.points)]),
     )
-    assert len(place_surface(two, cube).fronts) == 2
+    assert len(place_crack(two, cube).fronts) == 2
 
 
 def grown(crack, da):
@@ -369,11 +369,11 @@ def grown(crack, da):
 
 def test_front_that_reaches_four_faces_splits_and_vanishes(cube):
     """The disc of radius 0.7 grows until it has cut the body; old points stay as they are."""
-    crack = place_surface(penny_crack((0, 0, 0.03), (0, 0, 1), 0.7, n=64), cube)
+    crack = place_crack(penny_crack((0, 0, 0.03), (0, 0, 1), 0.7, n=64), cube)
     seen = []
     for _ in range(12):
         larger = grown(crack, 0.08)
-        crack = place_surface(larger, cube)
+        crack = place_crack(larger, cube)
         np.testing.assert_array_equal(crack.points[: len(larger.points)], larger.points)
         np.testing.assert_array_equal(crack.faces[: len(larger.faces)], larger.faces)
         seen.append(len(crack.fronts))
@@ -385,9 +385,9 @@ def test_front_that_reaches_four_faces_splits_and_vanishes(cube):
 
 
 def test_front_leaves_through_a_far_face(cube, body):
-    crack = place_surface(rectangle(-1, 0.5, -1, 1), cube)
+    crack = place_crack(rectangle(-1, 0.5, -1, 1), cube)
     for _ in range(8):
-        crack = place_surface(grown(crack, 0.1), cube)
+        crack = place_crack(grown(crack, 0.1), cube)
         check_fronts(crack, body)
         if not crack.fronts:
             break
@@ -408,7 +408,7 @@ def test_drawn_cracks_have_ends_outside(seed, cube, body):
             rng.uniform(0.3, 0.8),
         )
         try:
-            placed = place_surface(crack, cube)
+            placed = place_crack(crack, cube)
         except GeometryError:
             continue
         accepted += 1
@@ -417,13 +417,13 @@ def test_drawn_cracks_have_ends_outside(seed, cube, body):
             assert all(pair in edges for pair in zip(number[:-1], number[1:], strict=True))
             depth, _ = body.depth(front.x[[0, -1]])
             assert front.is_closed or (depth > 1.9 * body.cell_size(front.x[[0, -1]])).all()
-        again = place_surface(placed, cube)
+        again = place_crack(placed, cube)
         np.testing.assert_array_equal(again.points, placed.points)
     assert accepted >= 9
 
 
 def test_extension_reaches_ahead_of_every_front(cube):
-    placed = place_surface(rectangle(-0.3, 0.3, -1, 1), cube)
+    placed = place_crack(rectangle(-0.3, 0.3, -1, 1), cube)
     surface = extended_surface(placed, cube, 0.25)
     for k, x in ((1, -0.55), (2, 0.55)):
         strip = surface.points[np.unique(surface.triangles[surface.label == k])]
@@ -436,7 +436,7 @@ def test_strips_are_crossed_where_they_are_not_flat(cube):
     """Two triangles a field ahead of a plane crack, four where rays from a bent one turn."""
     disc = penny_crack((0, 0, 0.03), (0, 0, 1), 0.5)
     bent = xc.surface_crack(disc.points + np.outer(disc.points[:, 0] ** 2, (0, 0, 0.3)), disc.faces)
-    both = [extended_surface(place_surface(crack, cube), cube, 0.25) for crack in (disc, bent)]
+    both = [extended_surface(place_crack(crack, cube), cube, 0.25) for crack in (disc, bent)]
     flat_strip, twisted_strip = ((surface.label == 1).sum() for surface in both)
     assert twisted_strip == pytest.approx(2 * flat_strip, rel=0.05)
 
@@ -453,7 +453,7 @@ def test_strips_are_crossed_where_they_are_not_flat(cube):
 )
 def test_cracks_that_no_mesh_takes(crack, message, cube):
     with pytest.raises(GeometryError, match=message):
-        place_surface(crack, cube)
+        place_crack(crack, cube)
 
 
 def sheet(profile, n=8):
@@ -511,14 +511,14 @@ BESIDE = penny_crack((0.1, 0, 0.03), (0, 0, 1), 0.8, n=48)
 )
 def test_surfaces_that_meet_themselves(crack, message):
     with pytest.raises(GeometryError, match=message):
-        place_surface(crack, xc.box((-1,) * 3, (1,) * 3, 8))
+        place_crack(crack, xc.box((-1,) * 3, (1,) * 3, 8))
 
 
 def test_remedies_for_surfaces_that_meet_themselves():
     """What the refusals say is done, and the crack is taken."""
     coarse, fine = (xc.box((-1,) * 3, (1,) * 3, n) for n in (8, 20))
-    assert len(place_surface(hairpin(0.1), fine).fronts) == 1
-    assert len(place_surface(folded(40), coarse).fronts) == 1
+    assert len(place_crack(hairpin(0.1), fine).fronts) == 1
+    assert len(place_crack(folded(40), coarse).fronts) == 1
     arms = [xc.arm(ACROSS, on=0, side=side) for side in (1, -1)]
     scene = xc.Problem(coarse, xc.Isotropic(1.0, 0.3), cracks=[DISC, *arms])
     assert all(crack.fronts for crack in scene.placed)
@@ -538,7 +538,7 @@ def test_a_notch_is_narrower_than_a_cell(body):
     slit = (np.abs(middle[:, 0] - 0.475) < 0.025) & (middle[:, 2] > 0.25)
     used, inverse = np.unique(mesh.cells[~slit], return_inverse=True)
     mesh = xc.Mesh(mesh.points[used], inverse.reshape(-1, 4))
-    placed = place_surface(rectangle(0.5, 0.8, 0, 1, z=0.6), mesh)
+    placed = place_crack(rectangle(0.5, 0.8, 0, 1, z=0.6), mesh)
     (front,) = front_frames(placed)
     np.testing.assert_allclose(front.x[:, 0], 0.8, atol=1e-12)
     mouth = placed.points[np.abs(placed.points[:, 1] - 0.5) < 0.3]
@@ -549,7 +549,7 @@ def test_a_notch_is_narrower_than_a_cell(body):
 
 
 def placed_pair(cube, *cracks):
-    return tuple(place_surface(crack, cube) for crack in cracks)
+    return tuple(place_crack(crack, cube) for crack in cracks)
 
 
 def test_cracks_that_cross_or_touch(cube):
@@ -578,6 +578,6 @@ def test_fronts_closer_than_a_cell(cube):
 
 def test_cracks_may_meet_outside(cube):
     """Mouths that are led outside may cross there."""
-    one = place_surface(rectangle(-1, -0.2, -1, 1, z=0.4), cube)
+    one = place_crack(rectangle(-1, -0.2, -1, 1, z=0.4), cube)
     tilted = plane_crack([(-1, -1, 0.7), (-1, 1, 0.7), (-0.2, 1, 1.6), (-0.2, -1, 1.6)])
-    check_surfaces((one, place_surface(tilted, cube)), cube)
+    check_surfaces((one, place_crack(tilted, cube)), cube)

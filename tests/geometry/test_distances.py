@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 import xcrack as xc
 from xcrack import Crack, elliptic_crack, penny_crack, plane_crack, surface_crack
 from xcrack.crack.fronts import front_frames
-from xcrack.crack.placing_3d import place_surface
+from xcrack.crack.stations import place_crack
 from xcrack.fem.level_set import extended_surface
 from xcrack.mesh.distances import (
     closest_in,
@@ -143,7 +143,7 @@ def _outward(mesh, facets):
     ids=["penny", "half penny", "ellipse", "edge", "hollow"],
 )
 def test_flat_crack_has_linear_phi_ahead_of_its_front_as_well(crack):
-    placed = place_surface(crack, cube())
+    placed = place_crack(crack, cube())
     surface = extended_surface(placed, cube(), 0.4)
     x = np.random.default_rng(97).uniform(-1, 1, (4000, 3)) * [1, 1, 0.3]
     x[::5, 2] = 0.03
@@ -153,7 +153,7 @@ def test_flat_crack_has_linear_phi_ahead_of_its_front_as_well(crack):
 
 
 def test_points_in_the_plane_of_a_crack_get_zero():
-    placed = place_surface(penny_crack((0, 0, 0), (0, 0, 1), 0.5), cube())
+    placed = place_crack(penny_crack((0, 0, 0), (0, 0, 1), 0.5), cube())
     surface = extended_surface(placed, cube(), 0.3)
     x = np.random.default_rng(1312).uniform(-0.5, 0.5, (3000, 3)) * [1, 1, 0]
     phi, _, _ = surface_distance(x, surface.points, surface.triangles)
@@ -165,7 +165,7 @@ def test_surface_comes_before_the_strip_that_lies_on_it():
     u = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (0.15, 0.5), (0.15, -0.2), (-0.15, -0.2)]
     outline = [(x, y, 0.0) for x, y in [*u, (-0.15, 0.5), (-0.5, 0.5)]]
     mesh = cube(20)
-    placed = place_surface(plane_crack(outline), mesh)
+    placed = place_crack(plane_crack(outline), mesh)
     surface = extended_surface(placed, mesh, 0.5)
     x = placed.points[placed.faces].mean(axis=1)
     x[:, 2] = 0.01
@@ -201,7 +201,7 @@ def test_spherical_cap_converges():
     ahead = (rho - np.sin(angle)) * np.cos(angle) - (x[:, 2] - np.cos(angle)) * np.sin(angle)
     error = []
     for edge in edges:
-        placed = place_surface(cap(angle, edge), mesh)
+        placed = place_crack(cap(angle, edge), mesh)
         surface = extended_surface(placed, mesh, 0.4)
         front = front_frames(placed)[0]
         phi, triangle, _ = surface_distance(x, surface.points, surface.triangles)
@@ -216,7 +216,7 @@ def test_spherical_cap_converges():
 
 
 def test_frames_of_a_penny():
-    placed = place_surface(penny_crack((0.2, 0, 0.1), (1, 2, 2), 0.4, n=64), cube())
+    placed = place_crack(penny_crack((0.2, 0, 0.1), (1, 2, 2), 0.4, n=64), cube())
     (front,) = front_frames(placed)
     n = np.array([1, 2, 2]) / 3
     radial = (front.x - [0.2, 0, 0.1]) / 0.4

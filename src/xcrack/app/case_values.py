@@ -162,9 +162,7 @@ def makers_of(base: type) -> dict[str, Callable[..., Any]]:
     return makers
 
 
-def value_of_table(
-    table: Table, makers: Mapping[str, Callable[..., Any]], default: str = ""
-) -> Any:
+def value_of_table(table: Table, makers: Mapping[str, Callable[..., Any]]) -> Any:
     """Value of a table: that of the function which its key `kind` names.
 
     Raises
@@ -173,9 +171,9 @@ def value_of_table(
         No such kind, a key that is unknown or missing, a wrong unit, or what the function says;
         with file and line.
     """
-    if _WORD not in table and not default:
+    if _WORD not in table:
         table.refuse("", f"the key 'kind' is missing: give one of {', '.join(makers)}.")
-    kind = table.text(_WORD, default or None)
+    kind = table.text(_WORD)
     if kind not in makers:
         table.refuse(_WORD, f"{kind!r:.40} is not known: known are {', '.join(makers)}.")
     return called_with(table, makers[kind], f" of {kind!r}", (_WORD,))

@@ -272,7 +272,7 @@ class ShortFront:
         )
 
 
-def place_surface(crack: Crack, mesh: Mesh) -> Crack:
+def surface_placement(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
     """Decide which parts of a crack's outline are front in this mesh, and lead mouths outside.
 
     Parts of the outline inside the body are front; parts outside, or within half a cell of the
@@ -288,10 +288,12 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
 
     Returns
     -------
-    Crack
+    crack : Crack
         With `fronts` set. Ends of open fronts lie two cells outside the body, mouths at least
         one cell (less in a gap that is narrower). A warning names a front that is shorter than a
         cell and becomes part of the mouth; of a crack that has grown, where none is left.
+    short_fronts : list of ShortFront
+        Pieces of the outline that are no fronts, of a crack that is placed for the first time.
 
     Raises
     ------
@@ -299,24 +301,6 @@ def place_surface(crack: Crack, mesh: Mesh) -> Crack:
         No part of the crack lies inside the body; or the crack is smaller than a cell, or ends
         less than half a cell inside the boundary that it comes from; it crosses itself, or comes
         back to within half a cell of itself.
-    """
-    return surface_placement(crack, mesh)[0]
-
-
-def surface_placement(crack: Crack, mesh: Mesh) -> tuple[Crack, list[ShortFront]]:
-    """A crack placed as by `place_surface`, and what its mesh is too coarse for.
-
-    Parameters
-    ----------
-    crack : Crack
-        In 3D.
-    mesh : Mesh
-
-    Returns
-    -------
-    crack : Crack
-    short_fronts : list of ShortFront
-        Pieces of the outline that are no fronts, of a crack that is placed for the first time.
     """
     if crack.ends_on and crack.fronts is not None:
         return crack, []

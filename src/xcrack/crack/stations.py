@@ -107,7 +107,7 @@ def place_crack(crack: Crack, mesh: Mesh) -> Crack:
     Returns
     -------
     Crack
-        With `tips` or `fronts`; see `place_line` and `place_surface`.
+        With `tips` or `fronts`; see `place_line` and `surface_placement`.
 
     Raises
     ------

@@ -47,14 +47,14 @@ def tip_values(r: Floats, theta: Floats, n: int = 4) -> Floats:
     return np.sqrt(r)[..., None] * angular_functions(theta)[0][..., :n]
 
 
-def tip_derivatives(r: Floats, theta: Floats, n: int = 4) -> tuple[Floats, Floats]:
-    """Derivatives of the tip functions along (ahead, normal), `(..., n)` each."""
+def tip_derivatives(r: Floats, theta: Floats) -> tuple[Floats, Floats]:
+    """Derivatives of the tip functions along (ahead, normal), `(..., 4)` each."""
     g, dg = angular_functions(theta)
     scale = 1 / np.sqrt(r)[..., None]
     C, S = np.cos(theta)[..., None], np.sin(theta)[..., None]
     slope_ahead = scale * (0.5 * g * C - dg * S)
     normal = scale * (0.5 * g * S + dg * C)
-    return slope_ahead[..., :n], normal[..., :n]
+    return slope_ahead, normal
 
 
 def mode_matrix(kolosov: float, mu: float) -> Floats:

@@ -765,13 +765,13 @@ def _gain(step: Step, cracks_now: Sequence[Crack], mesh: Mesh, exponent: float) 
     return max(_gain_of((size / old_size) ** 2, exponent) for old_size, size in sizes)
 
 
-def _gain_of(area_ratio: float, exponent: float, power: float = 0.5) -> float:
+def _gain_of(area_ratio: float, exponent: float) -> float:
     """Mean rate while an area grows by a ratio, over that at its beginning.
 
-    K goes with a power of its root.
+    K goes with the root of the size, whose square the area is.
     """
     x = 0.5 * np.log(area_ratio)
-    return float(exprel(x) / exprel(x - exponent * power * x))
+    return float(exprel(x) / exprel(x - exponent * 0.5 * x))
 
 
 def _share(
