@@ -121,6 +121,17 @@ def _values_beside(part: GrowthStations, values: Floats, x: Floats, mesh: Mesh) 
     return interpolate_along_front(part.x, part.front, _closed_fronts(part), values, x, reach)
 
 
+def _values_at(
+    stations: GrowthStations, values: Floats, crack: Ints, x: Floats, mesh: Mesh
+) -> Floats:
+    """Values at stations at points of some cracks beside them; nan where there are none."""
+    result = np.full((len(x), *values.shape[1:]), np.nan)
+    for c in np.unique(crack):
+        rows, rows_there = stations.crack == c, crack == c
+        result[rows_there] = _values_beside(stations.at(rows), values[rows], x[rows_there], mesh)
+    return result
+
+
 def _closed_fronts(part: GrowthStations) -> list[bool]:
     """Of each front of a crack whether it is closed."""
     result = [False] * (int(part.front.max(initial=-1)) + 1)
@@ -230,10 +241,7 @@ def _corrected_part(
         offset=np.zeros_like(x),
         fresh=np.zeros(len(x), dtype=bool),
     )
-    direction = np.stack(
-        [_values_beside(stations_here, solves.direction[0][:, k], x, mesh) for k in range(3)],
-        axis=1,
-    )
+    direction = _values_beside(stations_here, solves.direction[0], x, mesh)
     rest = np.nan_to_num(_values_beside(stations_before, growth_owed, x, mesh))
     unit = direction / np.linalg.norm(direction, axis=1)[:, None]
     part = replace(part, offset=rest[:, None] * unit)
@@ -446,16 +454,9 @@ def ends_of(step: Step, plan: Plan) -> Floats:
 
 def advance_of(step: Step, plan: Plan, rates: Rates) -> Floats:
     """Advance to the next step at the stations that were solved `(n,)`, length."""
-    stations = solves_of(step)[0]
-    mesh, at = rates.problem.mesh, rates.stations
-    parts = [np.zeros(0)]
-    for c in range(len(rates.cracks)):
-        rows = stations.crack == c
-        advance_nearby = _values_beside(
-            stations.at(rows), plan.arc[rows], at.x[at.crack == c], mesh
-        )
-        parts.append(np.nan_to_num(advance_nearby))
-    return np.concatenate(parts)
+    at = rates.stations
+    advance = _values_at(solves_of(step)[0], plan.arc, at.crack, at.x, rates.problem.mesh)
+    return np.nan_to_num(advance)
 
 
 # A solve: correct the step that led there.
@@ -502,7 +503,7 @@ def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) 
     parts_here = [_part(solved_fronts, c) for c in range(len(rates.cracks))]
     first_rate = _rate(rule, solves)
     fastest_rate = float(first_rate.max(initial=0.0))
-    rate, direction = _carried_back(rule, step, rates, parts_here)
+    rate, direction = _carried_back(rule, step, rates, solved_fronts)
     cycles, cycle_error = _cycles(rule, step, rates)
     share = plan.length / rate.max(initial=0.0) * rate if rate.max(initial=0.0) > 0 else None
     overloads = None
@@ -574,28 +575,19 @@ def correct(rule: GrowthRule, step: Step, rates: Rates, identities: Identities) 
 
 
 def _carried_back(
-    rule: GrowthRule,
-    step: Step,
-    rates: Rates,
-    parts_here: Sequence[tuple[GrowthStations, SolveHistory]],
+    rule: GrowthRule, step: Step, rates: Rates, solved_fronts: tuple[GrowthStations, SolveHistory]
 ) -> tuple[Floats, Floats]:
     """Rates (n,) and directions (n, 3) at the end of a step, at the stations of its beginning."""
     plan, (stations, solves) = plan_of(step), solves_of(step)
-    mesh, first = rates.problem.mesh, _rate(rule, solves)
-    rate, direction = np.array(first), np.array(solves.direction[-1])
-    for c, (part, values) in enumerate(parts_here):
-        rows = np.nonzero(stations.crack == c)[0]
-        target = (stations.x + plan.move)[rows]
-        law_rate = _values_beside(part, values.rate[0], target, mesh)
-        is_lost = np.isnan(law_rate)
-        rate_nearby = np.nan_to_num(_values_beside(part, _rate(rule, values), target, mesh))
-        rate[rows] = np.where(is_lost, first[rows], rate_nearby)
-        heading = np.stack(
-            [_values_beside(part, values.direction[0][:, k], target, mesh) for k in range(3)],
-            axis=1,
-        )
-        direction[rows] = np.where(is_lost[:, None], solves.direction[-1][rows], heading)
-    return rate, direction
+    solved_stations, at_end = solved_fronts
+    columns = np.column_stack([at_end.rate[0], _rate(rule, at_end), at_end.direction[0]])
+    target, mesh = stations.x + plan.move, rates.problem.mesh
+    columns = _values_at(solved_stations, columns, stations.crack, target, mesh)
+    is_lost = np.isnan(columns[:, 0])
+    return (
+        np.where(is_lost, _rate(rule, solves), np.nan_to_num(columns[:, 1])),
+        np.where(is_lost[:, None], solves.direction[-1], columns[:, 2:]),
+    )
 
 
 def _corrected_crack(
