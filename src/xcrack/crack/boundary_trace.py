@@ -443,8 +443,8 @@ def _end_between_walls(depth: Floats, target_depth: float) -> int | None:
         return None
     top = int(np.argmax(depth[: falls[0]]))
     near_wall = np.nonzero(depth[top:] < depth[top] / 2)[0]
-    last = top + int(near_wall[0]) if len(near_wall) else len(depth) - 1
-    return max(top, min(int(target_depth / _STEP), last))
+    last_step = top + int(near_wall[0]) if len(near_wall) else len(depth) - 1
+    return max(top, min(int(target_depth / _STEP), last_step))
 
 
 def way_to_middle(x: Floats, direction: Floats, size: float, body: Body) -> float:

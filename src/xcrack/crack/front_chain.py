@@ -238,11 +238,11 @@ def spaced_front(front: FrontChain, least_side: float) -> FrontChain:
         length = np.linalg.norm(front.side, axis=1)
         is_free = ~(front.is_pinned & np.roll(front.is_pinned, -1))[: len(length)]
         free_length = np.where(is_free, length, np.inf)
-        shortest = free_length.min()
-        if shortest >= least_side:
+        least_length = free_length.min()
+        if least_length >= least_side:
             return front
         # Sides of a regular front are alike but for round-off, which is no choice.
-        side = int(np.argmax(free_length <= (1 + _ALIKE) * shortest))
+        side = int(np.argmax(free_length <= (1 + _ALIKE) * least_length))
         end = (side + 1) % n
         # The point whose neighbour on the far side is nearer can better be spared.
         is_spared = length[side - 1] > (1 + _ALIKE) * length[end % len(length)]
