@@ -111,9 +111,9 @@ def _rows(kind: Any, prefix: str, leave_out: tuple[str, ...] = (), lead: str = "
 
 def array_names() -> dict[str, list[Row]]:
     """Names of the arrays of a run folder, shapes and units, and what they are, by groups."""
-    K = _rows(SIF, "", ("front", "s", "x", "frame", "errors", "ends"))
+    K = _rows(SIF, "", ("front", "s", "x", "frame", "errors", "ends", "smooth_K"))
     stations = _rows(SIF, "", ("K", "T", "spread", "at_surface", "closed", "domain_cells", "errors",
-                               "ends", "widened", "E_prime", "nu"))  # fmt: skip
+                               "ends", "widened", "smooth_K", "E_prime", "nu"))  # fmt: skip
     nested = ("cracks", "apart", "joins")
     return {
         "A step": [*_STEP],

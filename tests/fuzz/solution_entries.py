@@ -111,11 +111,15 @@ for _name in ("T", "domain_cells"):
     SIF[_name] = arg(Seen(rule=lambda v: (x := array(v)) is not None and x.shape == (1,)), [1.0])
 
 _WIDENED = Seen(rule=lambda v: v is None or ((x := array(v)) is not None and x.shape == (1, 2)))
+_OF_DOMAINS = Seen(
+    rule=lambda v: v is None or ((x := array(v)) is not None and x.shape == (1, 2, 2))
+)
 _CONSTANT = Seen(rule=lambda v: v is None or ((x := array(v)) is not None and x.shape == (1,)))
 OF_FRONTS = {
     "errors": arg(Seen(rule=lambda v: v is None), None),
     "ends": arg(Seen(rule=lambda v: isinstance(v, tuple) and not v), ()),
     "widened": arg(_WIDENED, None, [(0.0, 0.0)]),
+    "smooth_K": arg(_OF_DOMAINS, None, [[(0.0, 0.0), (0.0, 0.0)]]),
     "E_prime": arg(_CONSTANT, None, [1.0]),
     "nu": arg(_CONSTANT, None, [0.3]),
 }

@@ -26,6 +26,7 @@ from xcrack.sif.interaction_3d import (
     mean_integrals,
     reading,
     reading_of_modes,
+    smooth_values,
     solve_front,
 )
 
@@ -540,3 +541,24 @@ def test_bad_fronts_are_named():
 def _frames(x):
     normal = np.tile([0.0, 0.0, 1.0], (len(x), 1))
     return np.stack([x, normal, np.cross(x, normal)], axis=1)
+
+
+def test_values_of_hats_that_alternate_become_smooth():
+    """Of an analytic K with noise that alternates, closed and open; K of many tops comes back."""
+    valid, noise = np.ones(24, dtype=bool), 0.01 * (-1.0) ** np.arange(24)[:, None]
+    omega = 2 * np.pi * np.arange(24) / 24
+    around = np.stack([2 + np.cos(omega), np.sin(omega), np.cos(2 * omega)], axis=1)
+    along = np.stack([np.exp(-omega / 4), np.cosh(omega / 3), 1 / (4 + omega)], axis=1)
+    for K, is_closed in ((around, True), (along, False)):
+        smooth = smooth_values(K + noise, valid, is_closed)
+        assert (np.sqrt(np.mean((smooth - K) ** 2, axis=0)) < 0.6 * 0.01).all()
+        assert np.abs(smooth_values(K, valid, is_closed) - K).max() < 1e-3 * np.abs(K).max()
+
+
+def test_values_that_change_within_few_hats_stay():
+    valid, omega = np.ones(9, dtype=bool), 2 * np.pi * np.arange(9) / 9
+    K = np.stack([2 + np.cos(2 * omega), np.sin(2 * omega), np.zeros(9)], axis=1)[None, None]
+    assert np.abs(smooth_values(K, valid, True) - K).max() < 0.05
+    assert np.array_equal(smooth_values(K, omega > 1, True), K)
+    assert np.array_equal(smooth_values(K[..., :5, :], valid[:5], False), K[..., :5, :])
+    assert np.allclose(smooth_values(3 * K, valid, True), 3 * smooth_values(K, valid, True))

@@ -757,13 +757,12 @@ def _arrivals(
 
 
 def _without_stations(sif: SIF) -> SIF:
-    rows = {
-        name: getattr(sif, name)[:0]
-        for name in (
-            "x", "frame", "K", "T", "spread", "s", "front", "at_surface", "closed", "domain_cells"
-        )
-    }  # fmt: skip
-    return replace(sif, **rows, errors=None, ends=(), widened=None, E_prime=None, nu=None)
+    rows = {name: getattr(sif, name)[:0] for name in (
+        "x", "frame", "K", "T", "spread", "s", "front", "at_surface", "closed", "domain_cells",
+    )}  # fmt: skip
+    return replace(
+        sif, **rows, errors=None, ends=(), widened=None, smooth_K=None, E_prime=None, nu=None
+    )
 
 
 _OF_LARGEST = 0.1  # K_I below this share of the largest of a front compares with nothing

@@ -36,6 +36,7 @@ from xcrack.sif.interaction_3d import (
     lip_integrals,
     mean_integrals,
     reading_of_modes,
+    smooth_values,
     solve_front,
     twice_as_wide,
 )
@@ -144,6 +145,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
         closed=np.zeros(len(s), dtype=bool),
         domain_cells=nothing,
         widened=np.zeros((len(s), 3)),
+        smooth_K=np.zeros((len(s), 2, 3)),
         E_prime=E_prime,
         nu=nu,
     )
@@ -163,9 +165,11 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     matrix = reading_of_modes(values.knots, values.is_known, curve, all_places, values.is_smooth)
     K = np.einsum("msv,nkvm->nksm", matrix, values.K[:, :, values.is_known])
     K_of_wide = np.einsum("msv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
+    smooth_K = smooth_values(values.K, values.is_known, is_closed)[:, :, values.is_known]
+    smooth_K = np.einsum("msv,nkvm->nksm", matrix, smooth_K)
     if not materials.is_one:
         of_material = materials.factors(all_places)
-        K, K_of_wide = K * of_material, K_of_wide * of_material
+        K, K_of_wide, smooth_K = (part * of_material for part in (K, K_of_wide, smooth_K))
         values = replace(values, mean_K=values.mean_K * materials.factors(values.knots))
     period = curve.length if is_closed else None
     cells = np.interp(s, values.knots, values.radius, period=period) / values.domain.size
@@ -178,6 +182,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
             K=rows[0],
             spread=np.abs(rows[0] - rows[1]),
             widened=np.abs(rows[0] - K_of_wide[n, : len(s)]),
+            smooth_K=smooth_K[n, :, : len(s)].swapaxes(0, 1),
             at_surface=at_surface,
             domain_cells=cells,
         )

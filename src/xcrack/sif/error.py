@@ -634,14 +634,23 @@ def bars_beside(
 
 
 def _of_spread(sif: SIF, share: float) -> KErrors:
-    """At order 2 bars are the spread of two domains and of hats twice as wide, about K itself."""
-    return _complete_errors(sif, np.zeros_like(sif.K), _half_of_spread(sif, share))
+    """At order 2 bars are the spread of two domains and of hats twice as wide, about smooth K."""
+    eta = _smooth_domains(sif)[:, 0] - sif.K
+    eta[sif.closed, 0] = 0.0
+    return _complete_errors(sif, eta, _half_of_spread(sif, share))
+
+
+def _smooth_domains(sif: SIF) -> Floats:
+    """K of both domains `(f, 2, d)`, on curves along the front where they are known."""
+    if sif.smooth_K is not None:
+        return sif.smooth_K
+    return np.stack([sif.K, sif.K + sif.spread], axis=1)
 
 
 def _half_of_spread(sif: SIF, share: float = _WIDENED) -> Floats:
     """Half-width by two domains and by hats twice as wide, as root mean square along the front."""
     widening = np.zeros_like(sif.K) if sif.widened is None else np.array(sif.widened)
-    spread = np.array(sif.spread)
+    spread = np.abs(np.diff(_smooth_domains(sif), axis=1)[:, 0])
     spread[sif.closed, 0] = widening[sif.closed, 0] = 0.0
     parts = [
         _SPREAD_OF_FRONT * spread, share * widening,

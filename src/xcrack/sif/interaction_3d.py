@@ -29,6 +29,9 @@ _FEWEST = {True: 6, False: 3}  # hats of a closed front, steps of an open one
 _STEPS = 64  # samples to a step, by which an uneven spacing is measured out
 _GAUSS = np.polynomial.legendre.leggauss(6)
 _FLAT = 1e-9  # height of a lip point, as a share of the radius, that is round-off
+_DIFFERENCE = 3  # of values at tops that follow each other: zero where they are on a parabola
+_WEIGHTS = 4.0 ** np.arange(-9, 5)  # of its square: from no change to a parabola
+_FEWEST_SMOOTH = 6  # tops of which a smooth curve says more than themselves
 
 
 def _unit_modulus(s: Floats) -> Floats:
@@ -504,6 +507,33 @@ def twice_as_wide(
     K = _K_of_integrals(share @ moments, I @ share.T, tip_material, values)
     result[:, :, rows] = np.einsum("msv,nkvm->nksm", spline(knots[rows]), K)
     return result
+
+
+def smooth_values(K: Floats, is_valid: Bools, is_closed: bool) -> Floats:
+    """K `(..., p, 3)` at the tops of the hats without what differs from hat to hat by chance.
+
+    Hats as short as the cells read K with an error that alternates from one to the next. Here
+    values and third differences are weighed against each other by least squares (Whittaker, 1923,
+    Proc. Edinb. Math. Soc. 41, 63), with the weight of least generalised cross-validation V (Craven
+    and Wahba, 1979, Numer. Math. 31, 377): K that changes over four hats or more stays. Curves of
+    all weights are added by V^-p, so that their sum changes by little where K does. Few hats, and
+    hats of which some have no K (`is_valid`), stay as they are.
+    """
+    count = K.shape[-2]
+    if count < _FEWEST_SMOOTH or not is_valid.all():
+        return K
+    steps = np.eye(count)
+    for _ in range(_DIFFERENCE):
+        steps = np.roll(steps, -1, axis=0) - steps if is_closed else np.diff(steps, axis=0)
+    smoothing = np.linalg.inv(np.eye(count) + _WEIGHTS[:, None, None] * (steps.T @ steps))
+    curves = np.einsum("wij,...jm->w...im", smoothing, K)
+    freedom = count - np.trace(smoothing, axis1=1, axis2=2)
+    V = np.moveaxis(np.square(curves - K).sum(axis=-2), 0, -1) / freedom**2
+    V_min = V.min(axis=-1, keepdims=True)
+    share = np.where(V_min > 0, (V_min / np.where(V > 0, V, 1.0)) ** count, V == 0)
+    return np.asarray(
+        np.einsum("...mw,w...im->...im", share / share.sum(axis=-1, keepdims=True), curves)
+    )
 
 
 def _K_of_integrals(

@@ -133,6 +133,8 @@ class SIF:
         Where fronts come to free surfaces; none in 2D.
     widened : (f, d) array, stress · √length, optional
         In 3D: difference of K to that of hats along the front which are twice as wide.
+    smooth_K : (f, 2, d) array, stress · √length, optional
+        In 3D: K of both domains on smooth curves along the front; error bars are about the first.
     E_prime, nu : (f,) arrays, optional
         Of the material there: E / (1 - nu²), in plane stress E (stress), and Poisson's ratio.
 
@@ -155,6 +157,7 @@ class SIF:
     errors: KErrors | None = None
     ends: tuple[SurfaceEnd, ...] = ()
     widened: Floats | None = None
+    smooth_K: Floats | None = None
     E_prime: Floats | None = None
     nu: Floats | None = None
 
@@ -175,7 +178,9 @@ class SIF:
                 raise ProblemError(
                     f"SIF: {name} = {value_text(flags)}: give an array of bool of shape ({n},)."
                 )
-        for name, shape in (("widened", (n, d)), ("E_prime", (n,)), ("nu", (n,))):
+        for name, shape in (
+            ("widened", (n, d)), ("smooth_K", (n, 2, d)), ("E_prime", (n,)), ("nu", (n,))
+        ):  # fmt: skip
             if getattr(self, name) is not None:
                 numbers(getattr(self, name), f"SIF: {name}", shape, must_be_finite=False)
         if self.errors is not None and not isinstance(self.errors, KErrors):
@@ -258,6 +263,7 @@ class SIF:
             errors=errors,
             ends=tuple(replace(e, K=times(e.K), mean=times(e.mean)) for e in self.ends),
             widened=times(self.widened),
+            smooth_K=times(self.smooth_K),
         )
 
     def to_pandas(self) -> Any:
@@ -393,6 +399,7 @@ def joined_sif(parts: Sequence[SIF], dim: int) -> SIF:
         domain_cells=rows("domain_cells"),
         ends=tuple(replace(end, front=f) for f, part in enumerate(parts) for end in part.ends),
         widened=rows("widened", dim),
+        smooth_K=rows("smooth_K", 2, dim),
         E_prime=rows("E_prime"),
         nu=rows("nu"),
     )

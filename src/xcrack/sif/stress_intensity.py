@@ -144,7 +144,9 @@ def stress_intensities(
 def _without_K(sif: SIF) -> SIF:
     """K of a state in which nothing acts."""
     K, T = np.zeros_like(sif.K), np.where(np.isnan(sif.T), np.nan, 0.0)
-    return copy_without_checks(sif, K=K, T=T, spread=K, closed=np.zeros(len(K), dtype=bool))
+    return copy_without_checks(
+        sif, K=K, T=T, spread=K, smooth_K=None, closed=np.zeros(len(K), dtype=bool)
+    )
 
 
 def _checked_solutions(solutions: Any) -> list[Solution]:
