@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import xcrack as xc
+from xcrack.verification.exact.fields_3d import penny
 
 STEEL = xc.Isotropic(1.0, 0.3)
 PULL = [xc.traction("top", (0, 0, 1.0)), xc.traction("bottom", (0, 0, -1.0))]
@@ -85,6 +86,22 @@ def test_places_beside_a_free_surface_do_not_count(states):
     arc = 0.4 * np.minimum(np.arccos(np.clip(x / 0.4, 0, 1)), np.pi / 2)  # from the nearer end
     has_room = (arc > 1.1 * 0.25 * 0.4).sum(), (arc > 0.9 * 0.25 * 0.4).sum()
     assert has_room[0] <= len(adapted.rounds[-1].best) <= has_room[1] < len(sif.K) - 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("tolerance", "most"), [(0.03, 25_000), (0.005, 60_000)])
+def test_penny_in_one_round(tolerance, most):
+    """Exact K; .5 % took 116 k in two rounds while best K had what hats read by chance."""
+    low, high = np.array([-0.969, -1.047, -0.977]), np.array([1.031, 0.953, 1.023])
+    stress = np.diag([0.0, 0.0, 1.0])
+    supports = [xc.displacement("boundary", lambda x: penny(x, 0.4, 1.0, 0.3, stress))]
+    crack = xc.penny_crack((0, 0, 0), (0, 0, 1), 0.4)
+    scene = xc.Problem(xc.box(low, high, 4), STEEL, [crack], supports, contact="off")
+    adapted = xc.adapt(scene, tolerance, progress=False)
+    assert adapted.met
+    assert len(adapted.rounds) == 1
+    assert adapted.rounds[0].unknowns < most
+    assert np.abs(adapted.sif.best[:, 0] / (2 * math.sqrt(0.4 / math.pi)) - 1).max() < tolerance / 4
 
 
 @pytest.mark.slow

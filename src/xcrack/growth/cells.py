@@ -54,14 +54,14 @@ _LARGER = 1.25  # cells at an end over the size wanted there, from which on the 
 def begin(rule: GrowthRule) -> GrowthRule:
     """A run on the mesh that it begins with: as given, where error bars can be had on it.
 
-    Else it is finer at tips and fronts, along these by what the tolerance lets.
+    Else it is finer at tips and fronts, along these as half of the tolerance lets: lives err more.
 
     Raises
     ------
     ProblemError
         That has more unknowns than the run may have.
     """
-    mesh = _MESHES[rule.problem.mesh.dim].first_mesh(rule.problem, rule.tolerance or 0.0)
+    mesh = _MESHES[rule.problem.mesh.dim].first_mesh(rule.problem, (rule.tolerance or 0.0) / 2)
     least_unknowns = mesh.dim * (mesh.n_points + len(mesh.edges))
     if rule.max_unknowns is not None and least_unknowns > rule.max_unknowns:
         raise ProblemError(
