@@ -217,27 +217,27 @@ def _corrected_part(
     crack = cracks[c]
     mesh, fronts = rule.problem.mesh, front_frames(crack)
     is_inside = partial(inside_body, cracks, c, mesh)
-    places = [front_in_body(front.x, front.frame, front.is_closed, is_inside) for front in fronts]
-    x = np.concatenate([place.x for place in places])
-    number = np.repeat(np.arange(len(fronts)), [len(place.x) for place in places])
+    places, s, frame, length = [], [], [], []
+    for front in fronts:
+        place = front_in_body(front.x, front.frame, front.is_closed, is_inside)
+        arcs = _arcs_of_vertices(front)
+        places.append(place.x)
+        s.append(np.interp(place.number, np.arange(len(arcs)), arcs))
+        frame.append(place.with_frames(front.frame))
+        length.append(arcs[-1])
+    x, number = np.concatenate(places), np.repeat(np.arange(len(fronts)), [*map(len, places)])
     rate = _values_beside(stations_here, solves.rate[0], x, mesh)
     has_rate = ~np.isnan(rate)
     x, number = x[has_rate], number[has_rate]
-    lengths = _front_lengths(crack)
     part = GrowthStations(
         crack=np.full(len(x), c),
         front=number,
-        s=np.concatenate(
-            [
-                np.interp(p.number, np.arange(len(arcs)), arcs)
-                for p, arcs in zip(places, map(_arcs_of_vertices, fronts))
-            ]
-        )[has_rate],
+        s=np.concatenate(s)[has_rate],
         x=x,
-        frame=np.concatenate([p.with_frames(f.frame) for p, f in zip(places, fronts)])[has_rate],
+        frame=np.concatenate(frame)[has_rate],
         end=np.array(identities.ends[c], dtype=np.int64)[number],
         closed=np.array(closed_fronts(crack), dtype=bool)[number],
-        length=lengths[number],
+        length=np.array(length)[number],
         offset=np.zeros_like(x),
         fresh=np.zeros(len(x), dtype=bool),
     )
@@ -645,19 +645,22 @@ def _errors_at(rule: GrowthRule, step: Step, rates: Rates, gap: Floats) -> tuple
     result = []
     for c in range(len(rates.cracks)):
         rows = stations.crack == c
-        x, old_sif = rates.sif[0][c].x, step.sif[0][c]
+        x, largest_gap = rates.sif[0][c].x, float(gap[rows].max(initial=0.0))
         error_of_place = _values_beside(stations.at(rows), share_left(rule) * gap[rows], x, mesh)
-        error_of_place = np.nan_to_num(error_of_place)
-        if len(old_sif.x) and step.error is not None:
-            reach = 2 * REACH * float(cell_sizes(mesh, old_sif.x).mean())
-            reach += float(gap[rows].max(initial=0.0))
-            error_before, is_closed = step.error.place[c], closed_fronts(step.cracks[c])
-            error_nearby = interpolate_along_front(
-                old_sif.x, old_sif.front, is_closed, error_before, x, reach
-            )
-            error_of_place = error_of_place + np.nan_to_num(error_nearby)
-        result.append(np.asarray(error_of_place))
+        error_before = errors_before(step, c, x, mesh, largest_gap)
+        result.append(np.nan_to_num(error_of_place) + error_before)
     return tuple(result)
+
+
+def errors_before(step: Step, c: int, x: Floats, mesh: Mesh, gap: float = 0.0) -> Floats:
+    """Errors of the places of a crack of a step at others close by, across a gap; 0 elsewhere."""
+    sif = step.sif[0][c]
+    if step.error is None or not len(sif.x):
+        return np.zeros(len(x))
+    reach = 2 * REACH * float(cell_sizes(mesh, sif.x).mean()) + gap
+    is_closed = closed_fronts(step.cracks[c])
+    error = interpolate_along_front(sif.x, sif.front, is_closed, step.error.place[c], x, reach)
+    return np.nan_to_num(error)
 
 
 def _cycles(rule: GrowthRule, step: Step, rates: Rates) -> tuple[float, float]:
@@ -878,6 +881,7 @@ __all__ = [
     "cycles_of_passage",
     "cycles_until",
     "ends_of",
+    "errors_before",
     "interpolate_along_front",
     "partly_advanced",
     "predict",

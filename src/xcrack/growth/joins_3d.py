@@ -10,7 +10,7 @@ from scipy.special import exprel
 from xcrack.base.arrays import Bools, Floats, at
 from xcrack.base.errors import GeometryError
 from xcrack.crack.crack import Crack
-from xcrack.crack.fronts import closed_fronts, front_frames
+from xcrack.crack.fronts import front_frames
 from xcrack.crack.junctions_3d import (
     FaceAhead,
     crossings,
@@ -39,14 +39,13 @@ from xcrack.crack.merging import (
 from xcrack.crack.placing_3d import meeting_points, place_arm, place_arms
 from xcrack.fem.system import discretise
 from xcrack.growth import euler, fronts
-from xcrack.growth.fronts import interpolate_along_front
 from xcrack.growth.gaps import UNKNOWN_OF_FRONTS, closing_annulus, part_of_time
 from xcrack.growth.options import GrowthRule
 from xcrack.growth.rates import Rates
 from xcrack.growth.stations import Identities
 from xcrack.growth.step import Corrected, Join, Plan, Step, StepError, plan_of, solves_of
 from xcrack.mesh.distances import closest_in, triangle_tree
-from xcrack.mesh.locate import Body, cell_sizes
+from xcrack.mesh.locate import Body
 from xcrack.mesh.mesh import Mesh
 
 _LIGAMENT = 0.9  # cells: radius of a ligament inside a front below which it breaks
@@ -69,7 +68,6 @@ _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined fro
 _SPACING = 0.5  # of a cell, between the points of a new front
 _WITHIN = 1e-3  # of a cell: to which the gap is closed
 _TRIES = 12  # advances until it is
-_REACH = 4.0  # cells from a place along a front to those of the step before
 _MOST = 0.75  # of a cell: gap that may be left where the fronts speed up towards each other
 
 _INTEGRATORS = {"euler": euler, "pec": fronts}
@@ -449,7 +447,11 @@ def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identit
     """A step whose cracks have just joined: growth begins anew, after the cycles so far."""
     mesh, cycles_before = rates.problem.mesh, 0.0 if step.error is None else step.error.cycles
     plan = plan_of(step)
-    place = tuple(_errors(step, sif.x, mesh) for sif in rates.sif[0])
+    cracks = range(len(step.cracks))
+    place = tuple(
+        np.max([fronts.errors_before(step, c, sif.x, mesh) for c in cracks], axis=0)
+        for sif in rates.sif[0]
+    )
     error = StepError(place, cycles_before + plan.error)
     result = _INTEGRATORS[rule.integrator].begin_at(
         rule, rates, identities, step.cycles + plan.cycles, error, step
@@ -818,22 +820,6 @@ def _share(
         else:
             s_max, at_max = share, value
     return s_max
-
-
-def _errors(step: Step, x: Floats, mesh: Mesh) -> Floats:
-    """Estimated errors of the places of a step at places close by, 0 elsewhere."""
-    result = np.zeros(len(x))
-    for c, crack in enumerate(step.cracks):
-        place = None if step.error is None else step.error.place[c]
-        old_sif = step.sif[0][c]
-        if place is None or not len(old_sif.x):
-            continue
-        reach = _REACH * float(cell_sizes(mesh, old_sif.x).mean())
-        error_nearby = interpolate_along_front(
-            old_sif.x, old_sif.front, closed_fronts(crack), place, x, reach
-        )
-        result = np.maximum(result, np.nan_to_num(error_nearby))
-    return result
 
 
 def _hindrance(rule: GrowthRule) -> str:
