@@ -51,8 +51,9 @@ def test_a_corner_crack_grown_through_the_far_side():
             assert "bottom" not in m
     (arrival,) = [each for step in history.steps for each in step.arrivals]
     assert arrival.name == "bottom"
-    assert arrival.x[::2] == pytest.approx((0, 0), abs=0.5 * CELL)
-    assert arrival.cycles == pytest.approx(3000, rel=5e-3)
+    # The place on the other side comes first, looked at a twentieth of the way to the next one.
+    assert arrival.x[::2] == pytest.approx((0, 0), abs=0.1 * CELL)
+    assert arrival.cycles == pytest.approx(3000, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -68,7 +69,11 @@ def test_a_surface_crack_grown_through_three_sides():
     assert first == pytest.approx(expected, abs=0.1 * CELL / RATE)
     last = history.steps[-1]
     assert last.n_tips == 0
-    assert re.match(r"front left the body: front [01] of crack 0 reached ", history.ended)
+    assert re.match(r"front left the body: front( 1)? of crack 0 reached ", history.ended)
+    # A mirror of the scene is one of the front, and the place between both arms is on it.
+    left, right = history.steps[3].arrivals
+    assert left.cycles == pytest.approx(right.cycles, rel=1e-9)
+    assert history.steps[4].arrivals[0].x[0] == pytest.approx(5.0, abs=1e-6)
     # √61 from the middle to the corners; the last places lie up to a cell beside them.
     assert last.cycles == pytest.approx((np.sqrt(61) - 3) / RATE, abs=0.5 * CELL / RATE)
     for step in history.steps[:3]:

@@ -241,12 +241,17 @@ def spaced_front(front: FrontChain, least_side: float) -> FrontChain:
         least_length = free_length.min()
         if least_length >= least_side:
             return front
-        # Sides of a regular front are alike but for round-off, which is no choice.
-        side = int(np.argmax(free_length <= (1 + _ALIKE) * least_length))
+        # Sides of a regular front are alike but for round-off, which is no choice: those at the
+        # ends come first, so that a front with a mirror keeps it.
+        is_least = free_length <= (1 + _ALIKE) * least_length
+        from_middle = 2 * np.arange(len(length)) + 1 - len(length)
+        side = int(np.argmax(np.where(is_least, np.abs(from_middle), -1)))
         end = (side + 1) % n
         # The point whose neighbour on the far side is nearer can better be spared.
-        is_spared = length[side - 1] > (1 + _ALIKE) * length[end % len(length)]
-        point_that_stays = side if is_spared else end
+        length_back, length_ahead = length[side - 1], length[end % len(length)]
+        is_even = abs(length_back - length_ahead) <= _ALIKE * length_back
+        is_end_spared = from_middle[side] > 0 if is_even else length_back > length_ahead
+        point_that_stays = side if is_end_spared else end
         front = merge_side(front, side, front.x[point_that_stays])
 
 

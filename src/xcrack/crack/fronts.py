@@ -86,7 +86,10 @@ def front_frames(crack: Crack) -> list[Front]:
         number = np.array(front[:-1] if is_closed else front)
         x = crack.points[number]
         b = tangents(x, is_closed)
-        n = normal[number]
+        # Outside the body a face may be without area: its corner has the normal of the next one.
+        with_normal = np.nonzero(normal[number].any(axis=1))[0]
+        nearest_row = np.abs(np.arange(len(number))[:, None] - with_normal).argmin(axis=1)
+        n = normal[number[with_normal[nearest_row]]]
         n = unit(n - np.einsum("ij,ij->i", n, b)[:, None] * b)
         frame = np.stack([np.cross(n, b), n, b], axis=1)
         length = np.linalg.norm(np.diff(x, axis=0), axis=1)

@@ -114,6 +114,7 @@ def piece_cut_off(step: Step, problem: Problem) -> str:
 _REACH = 2.0  # cells from a place along a front to those of the step before
 _BISECTIONS = 40
 _LONGER = (2.0, 4.0, 8.0)  # times an advance: ways on which the last pieces of a front leave
+_INWARD = 0.05  # share of the way to the next place by which one on the surface is moved
 
 
 # An arrival whose cycles are not known yet, and the part of an advance until then; above 1 where
@@ -222,6 +223,7 @@ def _arriving_fronts(
     result = []
     for c, pair in enumerate(zip(advanced_cracks, placed_cracks, strict=True)):
         start, move = step.sif[0][c].x, moved_places(step, c) - step.sif[0][c].x
+        start = _beside_surface(start, body)
         part_inside = _parts(start, move, body)
         x = start + np.minimum(part_inside, 1.0)[:, None] * move
         if _tips_outside(*pair):
@@ -268,6 +270,22 @@ def _last_out(
     place = int(np.argmax(part))
     y = start[place] + part[place] * move[place]
     return [(place, y, float(np.linalg.norm(y - start[place])), float(part[place]))]
+
+
+def _beside_surface(x: Floats, body: Body) -> Floats:
+    """Places along fronts, those that lie on the surface a little towards the next one inside.
+
+    They run along their side of the body, and come to another one as what is beside them does.
+    """
+    depth, size = body.depth(x)
+    on_surface = np.nonzero(depth >= -ON * size)[0]
+    inner_places = x[depth < -ON * size]
+    if not (len(on_surface) and len(inner_places)):
+        return x
+    result = np.array(x)
+    distance = np.linalg.norm(x[on_surface, None] - inner_places, axis=2)
+    result[on_surface] += _INWARD * (inner_places[distance.argmin(axis=1)] - x[on_surface])
+    return result
 
 
 def _parts(start: Floats, move: Floats, body: Body) -> Floats:
