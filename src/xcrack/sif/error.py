@@ -634,10 +634,10 @@ def bars_beside(
 
 
 def _of_spread(sif: SIF, share: float) -> KErrors:
-    """At order 2 bars are the spread of two domains and of hats twice as wide, about smooth K."""
+    """At order 2 bars are by two domains, hats twice as wide, and what smooth K leaves out."""
     eta = _smooth_domains(sif)[:, 0] - sif.K
     eta[sif.closed, 0] = 0.0
-    return _complete_errors(sif, eta, _half_of_spread(sif, share))
+    return _complete_errors(sif, eta, np.hypot(_half_of_spread(sif, share), _mean(sif, eta)))
 
 
 def _smooth_domains(sif: SIF) -> Floats:
@@ -665,7 +665,7 @@ def _of_difference(sif: SIF, finer_sif: SIF, has_friction: bool) -> KErrors:
     half = _half_of_spread(finer_sif) if has_friction else np.zeros_like(finer_sif.K)
     for front in np.unique(sif.front):
         is_on_front, rows = sif.front == front, finer_sif.front == front
-        for to, values in ((finer_K, finer_sif.K), (domain_error, half)):
+        for to, values in ((finer_K, _smooth_domains(finer_sif)[:, 0]), (domain_error, half)):
             to[is_on_front] = _at(sif.x[is_on_front], finer_sif.x[rows], values[rows])
     eta = finer_K - sif.K
     eta[sif.closed, 0] = 0.0
