@@ -196,15 +196,18 @@ def merged_crack(
     flags = tuple(map(find_blocked, trees))
 
     if body is None:
-        return _with_gap_closed(both_cracks, facing_fronts, (), flags, radius, size, True)
+        return _with_gap_closed(
+            both_cracks, facing_fronts, (), flags, radius, size, begins_far=True
+        )
 
     def close_gap(count: int) -> Crack:
         short_fronts = tuple(
             [_with_short_ends(f, count, body) for f in group] for group in facing_fronts
         )
         return _with_gap_closed(
-            both_cracks, (short_fronts[0], short_fronts[1]), (), flags, radius, size, True
-        )
+            both_cracks, (short_fronts[0], short_fronts[1]), (), flags, radius, size,
+            begins_far=True,
+        )  # fmt: skip
 
     return _first_that_closes(close_gap, facing_fronts)
 
@@ -641,6 +644,7 @@ def _with_gap_closed(
     blocked_by: tuple[Callable[[Front], Bools], ...],
     radius: float,
     size: float,
+    *,
     begins_far: bool = False,
 ) -> Crack:
     """A crack with faces between those pieces of two groups of fronts that face each other.

@@ -280,7 +280,8 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
     else:
         c, f = ligament.crack, ligament.front
         stations = solves_of(step)[0]
-        cycles, advance, _ = closing_annulus(*ligament.radii, ligament.rates, m)
+        radii = _radii(step, ligament, body.mesh)
+        cycles, advance, _ = closing_annulus(*radii, ligament.rates, m)
         longest_share = max(1.0, ligament.cell / plan.largest)
         way = min(cycles / plan.cycles, longest_share)
         cycles = way * plan.cycles
@@ -302,21 +303,23 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
 
 @dataclass(frozen=True)
 class _Ligament:
-    """A round ligament inside a crack, as that of an annulus of the same area.
+    """A round ligament inside a crack.
 
     Attributes
     ----------
     crack, front : int
         Which, and its closed front around the ligament.
-    radii, rates, ways : (float, float), length, length/cycle and length
-        Of the inner front and the outer ones: rates and what is planned are means.
+    radius : float, length
+        Of the ligament.
+    rates, ways : (float, float), length/cycle and length
+        Of the inner front and the outer ones: means of the rates, and of what is planned.
     cell : float, length
         Size of the cells there.
     """
 
     crack: int
     front: int
-    radii: tuple[float, float]
+    radius: float
     rates: tuple[float, float]
     ways: tuple[float, float]
     cell: float
@@ -337,18 +340,23 @@ def _ligaments(step: Step, plan: Plan, body: Body) -> Iterator[_Ligament]:
             if not is_inner.any() or plan.arc[is_inner].mean() <= 0:
                 continue
             rate = np.where(plan.arc > 0, solves.rate[-1], 0.0)
-            disc_area = crack_areas([without_inner_front(crack, f)[0]], body.mesh)[0]
-            radius = float(np.linalg.norm(outward_way, axis=1).max())
             ligament = _Ligament(
                 crack=c,
                 front=f,
-                radii=(radius, max(float(np.sqrt(disc_area / np.pi)), radius)),
+                radius=float(np.linalg.norm(outward_way, axis=1).max()),
                 rates=_mean_pair(rate, is_inner, is_outer),
                 ways=_mean_pair(plan.arc, is_inner, is_outer),
                 cell=float(body.cell_size(front.x).mean()),
             )
             if ligament.rates[0] > 0:
                 yield ligament
+
+
+def _radii(step: Step, ligament: _Ligament, mesh: Mesh) -> tuple[float, float]:
+    """Radii of a ligament and of the annulus around it that has the area of the crack."""
+    whole_crack, _ = without_inner_front(step.corrected[ligament.crack], ligament.front)
+    disc_radius = float(np.sqrt(crack_areas([whole_crack], mesh)[0] / np.pi))
+    return ligament.radius, max(disc_radius, ligament.radius)
 
 
 def _mean_pair(values: Floats, is_inner: Bools, is_outer: Bools) -> tuple[float, float]:
@@ -359,7 +367,7 @@ def _mean_pair(values: Floats, is_inner: Bools, is_outer: Bools) -> tuple[float,
 def _closing_ligament(step: Step, plan: Plan, body: Body) -> _Ligament | None:
     """A ligament of whose radius less than a cell would be left: it breaks."""
     for ligament in _ligaments(step, plan, body):
-        if ligament.radii[0] - ligament.ways[0] < _LIGAMENT * ligament.cell:
+        if ligament.radius - ligament.ways[0] < _LIGAMENT * ligament.cell:
             return ligament
     return None
 
@@ -475,11 +483,12 @@ def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> f
         front = (step.corrected[c].fronts or ())[ligament.front].tolist()
         if ligament.crack != c or front not in waiting_lines or set(front) in lines:
             continue
-        cycles, _, rate = closing_annulus(*ligament.radii, ligament.rates, m)
+        radii = _radii(step, ligament, body.mesh)
+        cycles, _, rate = closing_annulus(*radii, ligament.rates, m)
         if rate == 0:
             return 1.0
         softening = float(later_rate.mean()) / rate
-        return closing_annulus(*ligament.radii, ligament.rates, m, softening)[0] / cycles
+        return closing_annulus(*radii, ligament.rates, m, softening)[0] / cycles
     return 1.0
 
 
