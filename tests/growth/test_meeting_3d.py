@@ -325,6 +325,53 @@ def test_fronts_led_on_to_each_other_take_their_time(seed):
     assert cycles[0] == pytest.approx(cycles[1], rel=0.15)
 
 
+@pytest.mark.parametrize(("gap", "offset"), [(0.3, 0.12), (0.4, 0.12), (0.3, 0.2), (0.35, 0.0)])
+def test_fronts_away_from_a_join_grow_as_long_as_it_takes(gap, offset):
+    """Theirs is rate times cycles, to 5 %: the mean of rates that grow exponentially on the way.
+
+    It was .65 to .7 of that: they stood still while what was left of the gap was closed at once.
+    """
+    half, radius = 0.32 + gap / 2, 0.32
+    cracks = [
+        xc.penny_crack((s * half + 0.013, 0.021, 0.0117 + s * offset / 2), (0, 0, 1), radius)
+        for s in (-1, 1)
+    ]
+    mesh = xc.box((-1.3, -1, -1), (1.3, 1, 1), (18, 14, 14))
+    problem = xc.Problem(
+        mesh, xc.Isotropic(E, NU), cracks, loads=loads(0.0)[:2], order=1, contact="off"
+    )
+    before, after = xc.collect(grow(problem, max_steps=2)).steps
+    assert after.joins
+    place, rate = [], []
+    for step in (before, after):
+        x = np.concatenate([sif.x for sif in step.sif[-1]])
+        far = int(np.argmin(x[:, 0]))
+        place.append(x[far, 0])
+        rate.append(np.concatenate(step.rate)[far])
+    by_rates = after.cycles * (rate[1] - rate[0]) / np.log(rate[1] / rate[0])
+    print(f"\n{place[0] - place[1]:.4f} for {by_rates:.4f}")
+    assert place[0] - place[1] == pytest.approx(by_rates, rel=0.05)
+
+
+def test_a_sheet_that_grows_up_to_another_one_cuts_a_piece_off():
+    """In words; where neither of two cracks has a front left it was a ValueError."""
+    pull = [xc.traction("right", (20.0, 0, 0)), xc.traction("left", (-20.0, 0, 0))]
+    sheet, wall = (
+        xc.plane_crack(outline)
+        for outline in (
+            [(-1.2, -1.2, 0.013), (0.35, -1.2, 0.013), (0.35, 1.2, 0.013), (-1.2, 1.2, 0.013)],
+            [(0.7, -1.2, -1.2), (0.7, 1.2, -1.2), (0.7, 1.2, 0.5), (0.7, -1.2, 0.5)],
+        )
+    )
+    problem = xc.Problem(
+        xc.box((-1,) * 3, (1,) * 3, 10), xc.Isotropic(E, NU), [sheet, wall],
+        loads=[*loads(0.0)[:2], *pull], order=1, contact="off",
+    )  # fmt: skip
+    history = xc.collect(grow(problem, da=0.15, max_steps=6))
+    assert "the piece around" in history.ended
+    assert "is cut off" in history.ended
+
+
 def twisted_pennies(angle, cells):
     """Two pennies in a cube, twisted about the line between them."""
     half, leg = np.radians(angle / 2), 2.5 / cells

@@ -9,7 +9,6 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 import xcrack as xc
-from xcrack.fem.system import discretise
 from xcrack.output.lip_faces_3d import junction_lines, lip_faces
 from xcrack.view.matplotlib import draw_cracks
 from xcrack.view.report_viewer import solution_layers
@@ -460,7 +459,26 @@ BAD = {
     ),
     "along it": ([ONE, xc.arm(xc.penny_crack((0, 0, 0.03), (0.05, 0, 1), 0.4), 0, 1)],
         "2 degrees|Leave this arm out"),
-    "touches along an edge": ([ONE, upright(0.017)], "let one of them end on the other"),
+    "touches along an edge": ([ONE, upright(0.017)], "meet near .* one of them end on the other"),
+    "touches along an edge from the other side": (
+        [ONE, xc.arm(upright(0.017), 0, -side_above(ONE))],
+        "wholly beyond crack 0",
+    ),
+    "an arm that lies in it over an area": (
+        [ONE, xc.arm(xc.penny_crack((0.5, 0.0, 0.017), (0, 0, 1), 0.35), 0, 1)],
+        "crack 1 lies on crack 0.* leave out of crack 1 what lies in crack 0",
+    ),
+    "two sheets that share an edge": (
+        [
+            xc.plane_crack([(-0.6, -0.3, 0.017), (0.013, -0.3, 0.017), (0.013, 0.3, 0.017),
+                            (-0.6, 0.3, 0.017)]),
+            upright(0.017),
+        ],
+        "meet near .* as one surface",
+    ),
+    "ends a third of a cell before a face": (
+        [ONE, upright(0.067)], "two cracks run through the cell.* draw one on to the other"
+    ),
     "lies in it over an area": (
         [ONE, xc.penny_crack((0.013, 0.0, 0.017), (0, 0, 1), 0.35)],
         "lie on each other near .* give both as one surface",
@@ -480,7 +498,7 @@ BAD = {
 def test_bad_arms_are_refused_with_the_remedy(name):
     cracks, words = BAD[name]
     with pytest.raises(xc.XcrackError, match=words):
-        discretise(scene(cracks))
+        xc.solve(scene(cracks))
 
 
 @pytest.mark.slow

@@ -30,6 +30,32 @@ def test_a_drawn_pair_is_solved(seed):
     assert row["K is nan"] == 0
 
 
+def test_a_hollow_ball_releases_what_it_does_in_a_large_body():
+    """Mackenzie (1950): 1/K' = 1/K (1 + 3 (1 - ν) φ / 2 (1 - 2 ν)) for a share φ of voids."""
+    nu, bulk = drawn_pairs.NU, drawn_pairs.E / (3 * (1 - 2 * drawn_pairs.NU))
+    void = 4 / 3 * np.pi * 0.3**3
+    exact = 0.5 * drawn_pairs.PULL**2 * void / bulk * 3 * (1 - nu) / (2 * (1 - 2 * nu))
+    assert drawn_pairs.hollow_ball_energy(0.3, 1e4) == pytest.approx(exact, rel=1e-9)
+    assert drawn_pairs.hollow_ball_energy(0.3, 1.0) > exact > drawn_pairs.penny_energy(0.3)
+
+
+@pytest.mark.parametrize(("seed", "factor"), [(2, 4.0), (2, 0.5), (9, 1.2)])
+def test_a_pair_that_releases_too_much_or_too_little_is_foreign(seed, factor, monkeypatch):
+    """Seed 9 nearly cuts the body: no ball fits around it, and finer cells judge."""
+    energies = iter([factor, 1.0])
+    true_energy = drawn_pairs.added_energy
+    monkeypatch.setattr(drawn_pairs, "added_energy", lambda s: next(energies) * true_energy(s))
+    with pytest.raises(drawn_pairs.ForeignEnergyError):
+        drawn_pairs.pair_row(seed)
+
+
+def test_a_step_whose_mean_of_G_is_off_is_judged_on_finer_cells():
+    """The host is led to a side of the cube: .6 % off, where the mean of G leaves 3.5 %."""
+    row = drawn_pairs.growing_row(0)
+    assert row["unbalanced"] > drawn_pairs.BALANCED
+    assert abs(row["unlike on finer cells"]) < 0.01
+
+
 def disc(far, n=120):
     """A disc of radius .5 that reaches to y = `far` where an upright penny crosses it at y > .15.
 

@@ -246,9 +246,38 @@ def own_gap(crack: Crack, body: Body, reach: float) -> OwnGap | None:
     reach : float
         In cells; farther apart they do not count.
     """
+    ends, width, size = _facing_points(crack, body, reach)
+    if not len(width):
+        return None
+    k = int(np.argmin(width))
+    return OwnGap(float(width[k]), float(size[k]), ends[k].mean(axis=0))
+
+
+def own_gap_around(crack: Crack, body: Body, reach: float, x: Floats) -> Floats:
+    """Width of the gap between fronts of one crack at places, and twice the way to it `(n,)`.
+
+    The least sum of both; infinite where no fronts face each other, see `own_gap`.
+    """
+    ends, width, _ = _facing_points(crack, body, reach)
+    if not len(width):
+        return np.full(len(x), np.inf)
+    way = np.linalg.norm(x[:, None] - ends.reshape(-1, 3), axis=2)
+    return np.asarray((2 * way + np.repeat(width, 2)).min(axis=1))
+
+
+def _facing_points(crack: Crack, body: Body, reach: float) -> tuple[Floats, Floats, Floats]:
+    """Points of closed fronts that face each other across a gap.
+
+    Returns
+    -------
+    ends : (n, 2, 3) array, length
+    width : (n,) array, length
+    size : (n,) array, length
+        Of the cells.
+    """
     fronts = [front for front in front_frames(crack) if front.is_closed]  # open: `joined_fronts`
     if not fronts:
-        return None
+        return np.zeros((0, 2, 3)), np.zeros(0), np.zeros(0)
     x, t, n = np.concatenate([_values_along(front) for front in fronts]).transpose(1, 0, 2)
     t, n = unit(t), unit(n)
     size = body.cell_size(x)
@@ -260,11 +289,8 @@ def own_gap(crack: Crack, body: Body, reach: float) -> OwnGap | None:
     faces &= np.einsum("ij,ij->i", n[pairs[:, 0]], n[pairs[:, 1]]) > _ANGLE
     faces &= width < reach * size[pairs[:, 0]]
     pairs, width = pairs[faces], width[faces]
-    is_inside = body.contains(x[pairs].mean(axis=1)) if len(pairs) else np.zeros(0, dtype=bool)
-    if not is_inside.any():
-        return None
-    k = int(np.argmin(np.where(is_inside, width, np.inf)))
-    return OwnGap(float(width[k]), float(size[pairs[k, 0]]), x[pairs[k]].mean(axis=0))
+    rows = np.nonzero(body.contains(x[pairs].mean(axis=1)))[0] if len(pairs) else np.zeros(0, int)
+    return x[pairs[rows]], width[rows], size[pairs[rows, 0]]
 
 
 def with_own_gap_closed(crack: Crack, x: Floats, radius: float, size: float) -> Crack:
@@ -893,6 +919,7 @@ __all__ = [
     "joined_fronts",
     "merged_crack",
     "own_gap",
+    "own_gap_around",
     "turned_crack",
     "with_own_gap_closed",
     "without_inner_front",

@@ -450,8 +450,9 @@ def _check_reach(cracks: Sequence[Crack], c: int, body: Body) -> str:
     size = body.cell_size(x)
     deviation = np.full(len(x), np.inf)
     for on, side in cracks[c].ends_on:
+        _check_not_flush(cracks, c, on, body)
         depth = side * signed_in(triangle_tree(cracks[on].points, cracks[on].faces), x)[0]
-        if not len(x) or (depth < 0).all():
+        if not len(x) or (depth < _TOUCH * size).all():
             raise GeometryError(
                 f"crack {c} lies wholly beyond crack {on}, on which it is to end from side "
                 f"{side:+d}: take side {-side}."
@@ -471,6 +472,22 @@ def _check_reach(cracks: Sequence[Crack], c: int, body: Body) -> str:
         f"{at(x[k])}: on that side no front is left as long as a cell ({size[k]:.4g}). Leave this "
         "arm out, or refine the mesh there."
     )
+
+
+def _check_not_flush(cracks: Sequence[Crack], c: int, on: int, body: Body) -> None:
+    """Raise where faces of an arm lie on those of the crack on which it ends."""
+    faces = cracks[c].points[cracks[c].faces]
+    middle, normals = faces.mean(axis=1), face_normals(cracks[c].points, cracks[c].faces)
+    tree = triangle_tree(cracks[on].points, cracks[on].faces)
+    nearest_point = closest_in(tree, middle)
+    cosine = np.einsum("ij,ij->i", tree.normal[nearest_point.triangle], normals)
+    is_flush = nearest_point.distance < _TOUCH * body.cell_size(middle)
+    is_flush &= (np.abs(cosine) > _FLUSH) & body.contains(middle)
+    if is_flush.any():
+        raise GeometryError(
+            f"crack {c} lies on crack {on}, on which it is to end, near {at(middle[is_flush][0])}: "
+            f"leave out of crack {c} what lies in crack {on}, or give both as one surface."
+        )
 
 
 def place_arms(cracks: Sequence[Crack], mesh: Mesh) -> list[Crack]:
@@ -697,9 +714,10 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
                         "as one surface, or leave out one that lies in the other."
                     )
                 raise GeometryError(
-                    f"cracks {i} and {j} cross near {at(meeting[0])}: let one of them end on the "
+                    f"cracks {i} and {j} meet near {at(meeting[0])}: let one of them end on the "
                     f"other, arm(crack, on={i}, side=1), and where it goes on beyond give a second "
-                    "arm with side=-1; or end it a few cells before."
+                    "arm with side=-1; or end it a few cells before. Give two that share an "
+                    "edge as one surface."
                 )
     _check_apart(cracks, body)
 
@@ -751,7 +769,7 @@ def _check_apart(cracks: tuple[Crack, ...], body: Body) -> None:
                 f"crack {arm} comes to within {distance[k]:.4g} of the front of crack {on}, on "
                 f"which it ends, at {at(x[i])}, closer than half a cell ({size[i] / 2:.4g}): "
                 f"refine the mesh there, let crack {on} reach farther beyond crack {arm}, or end "
-                "it a few cells before."
+                "it a few cells before. Give two that share an edge as one surface."
             )
         raise CoarseMeshError(
             f"the front of crack {owner[i]} at {at(x[i])} and that of crack "

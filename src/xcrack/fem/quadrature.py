@@ -523,7 +523,8 @@ def sub_cells(space: FunctionSpace, cells: Ints) -> SubCells:
             raise GeometryError(
                 f"two cracks run through the cell at "
                 f"{np.round(mesh.points[mesh.cells[failed_cells]].mean(axis=0), 6).tolist()}: "
-                f"refine the mesh between them until at least one cell lies in between."
+                f"refine the mesh between them until at least one cell lies in between, or draw "
+                f"one on to the other to end there."
             )
         side = base[owner].copy()
         side[:, c] = cut.sub_side[is_cut_cell]

@@ -101,8 +101,8 @@ def _advanced_lines(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     return joined_cracks(cracks, (way > 0).tolist(), meetings_now) if meetings_now else cracks
 
 
-def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
-    """The cracks after a part of a planned advance."""
+def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float | Floats) -> list[Crack]:
+    """The cracks after a part of a planned advance, or parts of it `(n,)` at the stations."""
     return advanced_cracks(rule, step, part * plan.arc)
 
 

@@ -411,8 +411,8 @@ def advanced_cracks(rule: GrowthRule, step: Step, way: Floats) -> list[Crack]:
     )
 
 
-def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
-    """The cracks after a part of a planned advance."""
+def partly_advanced(rule: GrowthRule, step: Step, plan: Plan, part: float | Floats) -> list[Crack]:
+    """The cracks after a part of a planned advance, or parts of it `(n,)` at the stations."""
     stations, solves = solves_of(step)
     growth = stations.growth(_rate(rule, solves), plan.largest)
     is_growing = growth >= WAITS_BELOW * plan.cell

@@ -1,10 +1,12 @@
 """Cracks in 3D join as soon as they meet: in one surface one front goes on, else one is an arm."""
 
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.special import exprel
 
 from xcrack.base.arrays import Bools, Floats, at
@@ -32,6 +34,7 @@ from xcrack.crack.merging import (
     gap_between,
     merged_crack,
     own_gap,
+    own_gap_around,
     turned_crack,
     with_own_gap_closed,
     without_inner_front,
@@ -68,6 +71,7 @@ _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined fro
 _SPACING = 0.5  # of a cell, between the points of a new front
 _WITHIN = 1e-3  # of a cell: to which the gap is closed
 _TRIES = 12  # advances until it is
+_AWAY = 2.0  # cells from where fronts meet, beyond which their rates tell how fast all grow
 _MOST = 0.75  # of a cell: gap that may be left where the fronts speed up towards each other
 
 _INTEGRATORS = {"euler": euler, "pec": fronts}
@@ -116,20 +120,26 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
             f"cracks {i} and {k} meet near {at(close_pairs[0][1].x)}, and {hindrance}"
         )
     m = solves_of(step)[1].exponent
-    time, way, time_at_first_rate = min(
-        [_shares_at_meeting(rule, step, plan, *close_pair, body, m) for close_pair in close_pairs]
-        + [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
-        + [_met_face(rule, step, plan, *pair, body, m, True) for pair in pairs_beside]
-    )
+    facing_times = [
+        _shares_at_meeting(rule, step, plan, *close_pair, body, m) for close_pair in close_pairs
+    ]
+    face_times = [_met_face(rule, step, plan, *pair, body, m) for pair in faces]
+    face_times += [_met_face(rule, step, plan, *pair, body, m, True) for pair in pairs_beside]
+    time, way, time_at_first_rate = first_meeting = min([*facing_times, *face_times])
     pairs_near = [*pairs_beside, *faces]  # fronts that only touch have no face ahead
-    joined_now, part = (
-        _joined_cracks(rule, _cracks_after(rule, step, plan, way), facing_pairs, pairs_near, body),
-        1.0,
-    )
+    share: float | Floats = way
+    if first_meeting in facing_times:
+        share = _shares_of_stations(step, plan, facing_pairs, way, time, body)
+    cracks_apart = _cracks_after(rule, step, plan, share)
+    joined_now, part = _joined_cracks(rule, cracks_apart, facing_pairs, pairs_near, body), 1.0
+    if joined_now.failure is not None and first_meeting in facing_times:
+        share = way  # all fronts as far as those that meet: their gap is what it was along them
+        cracks_apart = _cracks_after(rule, step, plan, share)
+        joined_now = _joined_cracks(rule, cracks_apart, facing_pairs, pairs_near, body)
     for lesser_part in (
         _PARTS if joined_now.failed_pairs else ()
     ):  # fronts that overlap may join while they are apart
-        cracks_before = _cracks_after(rule, step, plan, lesser_part * way)
+        cracks_before = _cracks_after(rule, step, plan, lesser_part * share)
         joined_sooner = _joined_cracks(
             rule, cracks_before, facing_pairs, [*pairs_near, *joined_now.failed_pairs], body
         )
@@ -166,7 +176,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     ]
     return replace(
         plan, part=way, cycles=cycles, error=cycle_error, cracks=tuple(joined_now.cracks),
-        apart=tuple(joined_now.cracks_apart), joins=tuple(joins_of_step),
+        apart=tuple(joined_now.cracks_apart), joins=tuple(joins_of_step), gain=gain,
     )  # fmt: skip
 
 
@@ -272,13 +282,26 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         if gap_met is None:
             return None
         c, way, gap = gap_met
+
+        def crack_without_gap(cracks: Sequence[Crack]) -> Crack:
+            return with_own_gap_closed(cracks[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
+
         cracks_apart = _cracks_after(rule, step, plan, way)
-        crack = with_own_gap_closed(cracks_apart[c], gap.x, _RADIUS * gap.size, _SPACING * gap.size)
-        time = _time_of_gap(step, plan, c, way, gap, (cracks_apart[c], crack), body)
-        x = gap.x
-        cycles = time * plan.cycles / _gain(step, cracks_apart, body.mesh, m)
+        first_cracks = cracks_apart[c], crack_without_gap(cracks_apart)
+        time = _time_of_gap(step, plan, c, way, gap, first_cracks, body)
+        stations = solves_of(step)[0]
+        widths = np.full(len(stations), np.inf)
+        rows, reach = stations.crack == c, _reach_of_gap(plan, way, gap)
+        widths[rows] = own_gap_around(step.corrected[c], body, reach, stations.x[rows])
+        share = _shares_beyond(plan, widths, way, time, body.cell_size(stations.x))
+        crack = first_cracks[1]
+        with suppress(GeometryError):  # a gap that cannot be closed so is as all fronts leave it
+            cracks_beside = _cracks_after(rule, step, plan, share)
+            crack, cracks_apart = crack_without_gap(cracks_beside), cracks_beside
+        x, gain = gap.x, _gain(step, cracks_apart, body.mesh, m)
+        cycles = time * plan.cycles / gain
     else:
-        c, f = ligament.crack, ligament.front
+        (c, f), gain = (ligament.crack, ligament.front), 1.0
         stations = solves_of(step)[0]
         radii = _radii(step, ligament, body.mesh)
         cycles, advance, _ = closing_annulus(*radii, ligament.rates, m)
@@ -297,7 +320,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
     return replace(
         plan, part=min(way, 1.0), cycles=cycles, error=UNKNOWN_OF_FRONTS * cycles,
         cracks=tuple(cracks_now),
-        apart=tuple(cracks_apart), joins=(join,), limit="", refusal="",
+        apart=tuple(cracks_apart), joins=(join,), gain=gain, limit="", refusal="",
     )  # fmt: skip
 
 
@@ -410,6 +433,11 @@ def _facing_gap(
     return last_met
 
 
+def _reach_of_gap(plan: Plan, way: float, gap: OwnGap) -> float:
+    """Cells up to which a gap may have been wide before a part of an advance."""
+    return 1.01 * (gap.width + 2 * way * plan.largest) / gap.size
+
+
 def _time_of_gap(
     step: Step, plan: Plan, c: int, way: float, gap: OwnGap, cracks: tuple[Crack, Crack], body: Body
 ) -> float:
@@ -431,8 +459,7 @@ def _time_of_gap(
         The crack with the gap, and without.
     body : Body
     """
-    reach = (gap.width + 2 * way * plan.largest) / gap.size
-    first_gap = own_gap(step.corrected[c], body, 1.01 * reach)
+    first_gap = own_gap(step.corrected[c], body, _reach_of_gap(plan, way, gap))
     area, area_apart, area_joined = (
         crack_areas([crack], body.mesh)[0] for crack in (step.corrected[c], *cracks)
     )
@@ -447,7 +474,49 @@ def _time_of_gap(
     return float(min(time, longest_time))
 
 
-def _cracks_after(rule: GrowthRule, step: Step, plan: Plan, part: float) -> list[Crack]:
+def _shares_of_stations(
+    step: Step,
+    plan: Plan,
+    pairs: Collection[tuple[int, int]],
+    way: float,
+    time: float,
+    body: Body,
+) -> Floats:
+    """Shares of an advance up to a meeting at the stations `(n,)`.
+
+    Fronts that meet wait where what is left between them is closed at once, while the others go on
+    for the cycles that this takes; where a gap closes faster than at first the others come less
+    far. Between the two shares lies as much as keeps the gap, and a cell at least.
+
+    Parameters
+    ----------
+    step : Step
+    plan : Plan
+    pairs : collection of pair of int
+        Cracks that meet.
+    way, time : float
+        Shares of the advance of fronts that meet, and of the cycles until they have.
+    body : Body
+    """
+    stations = solves_of(step)[0]
+    gap = np.full(len(stations), np.inf)
+    for c, on in {pair for i, k in pairs for pair in ((i, k), (k, i))}:
+        rows = np.nonzero(stations.crack == c)[0]
+        crack = step.corrected[on]
+        nearest_point = closest_in(triangle_tree(crack.points, crack.faces), stations.x[rows])
+        gap[rows] = np.minimum(gap[rows], nearest_point.distance)
+    return _shares_beyond(plan, gap, way, time, body.cell_size(stations.x))
+
+
+def _shares_beyond(plan: Plan, gap: Floats, way: float, time: float, size: Floats) -> Floats:
+    """Shares of an advance from those at the least gap to those far from it `(n,)`."""
+    if not np.isfinite(gap).any():
+        return np.full(len(gap), way)
+    ramp = np.maximum(2 * abs(time - way) * plan.largest, size)
+    return np.asarray(way + (time - way) * np.clip((gap - gap.min()) / ramp, 0.0, 1.0))
+
+
+def _cracks_after(rule: GrowthRule, step: Step, plan: Plan, part: float | Floats) -> list[Crack]:
     return _INTEGRATORS[rule.integrator].partly_advanced(rule, step, plan, part)
 
 
@@ -469,14 +538,42 @@ def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identit
 
 
 def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> float:
-    """Cycles of a ligament that broke inside a crack by the rates after it, over those before."""
+    """Cycles of a meeting by the rates after it, over those before."""
+    closed_share = _share_of_ligament(step, plan, result, body)
+    if closed_share is not None:
+        return closed_share
+    gain = _gain_beside(step, plan, result, body)
+    return 1.0 if gain is None else plan.gain / gain
+
+
+def _gain_beside(step: Step, plan: Plan, result: Corrected, body: Body) -> float | None:
+    """Mean rate of an advance over that at its beginning, of fronts away from where some met.
+
+    Rates grow exponentially along the way; places count by it. None where there are none.
+    """
+    stations, solves = solves_of(step)
+    rate, later_rate = solves.rate[-1], result.solves.rate[-1]
+    size, x = body.cell_size(stations.x), stations.x + plan.part * plan.move
+    distance, row = cKDTree(result.stations.x).query(x)
+    meeting_places = np.array([join.point for join in plan.joins])
+    way_to_meeting = cKDTree(meeting_places).query(stations.x)[0]
+    is_beside = (distance < size) & (way_to_meeting > _AWAY * size + plan.largest)
+    is_beside &= (plan.arc > 0) & (rate > 0)
+    ratio = later_rate[row] / np.where(rate > 0, rate, 1.0)
+    is_beside &= np.isfinite(ratio) & (ratio > 0)
+    if not is_beside.any():
+        return None
+    time_share = exprel(-np.log(ratio[is_beside]))
+    return float(1 / np.average(time_share, weights=plan.arc[is_beside]))
+
+
+def _share_of_ligament(step: Step, plan: Plan, result: Corrected, body: Body) -> float | None:
+    """The same of a ligament that broke inside a crack; None where none did."""
     c = plan.joins[0].cracks[0]
     if set(plan.joins[0].cracks) != {c} or len(plan.cracks) != len(step.corrected):
-        return 1.0
+        return None
     m = solves_of(step)[1].exponent
     later_rate = result.solves.rate[-1][result.stations.crack == c]
-    if not (len(later_rate) and np.isfinite(later_rate).all() and later_rate.mean() > 0):
-        return 1.0
     lines = [set(line.tolist()) for line in plan.cracks[c].fronts or ()]
     waiting_lines = [line.tolist() for line in plan.apart[c].fronts or ()]
     for ligament in _ligaments(step, plan, body):
@@ -485,11 +582,12 @@ def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> f
             continue
         radii = _radii(step, ligament, body.mesh)
         cycles, _, rate = closing_annulus(*radii, ligament.rates, m)
-        if rate == 0:
+        is_known = len(later_rate) > 0 and np.isfinite(later_rate).all() and later_rate.mean() > 0
+        if rate == 0 or not is_known:
             return 1.0
         softening = float(later_rate.mean()) / rate
         return closing_annulus(*radii, ligament.rates, m, softening)[0] / cycles
-    return 1.0
+    return None
 
 
 def _faces_near(cracks: Sequence[Crack], body: Body) -> list[FaceAhead]:
@@ -708,7 +806,12 @@ def _close_pairs(
     """
     result = []
     for i, k in combinations(range(len(cracks)), 2):
-        x = np.concatenate([cracks[i].points[front] for front in cracks[i].fronts or ()])
+        x = np.concatenate(
+            [
+                np.zeros((0, 3)),
+                *(crack.points[f] for crack in (cracks[i], cracks[k]) for f in crack.fronts or ()),
+            ]
+        )
         if not len(x) or may_touch(cracks, i, k):
             continue
         gap = gap_between(cracks[i], cracks[k], body, 3 * float(body.cell_size(x).max()))
