@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.special import exprel
 
 from xcrack.base.arrays import Bools, Floats, at
@@ -71,7 +70,6 @@ _RADIUS = 1.0  # cells: of the disc that rounds hollow corners of the joined fro
 _SPACING = 0.5  # of a cell, between the points of a new front
 _WITHIN = 1e-3  # of a cell: to which the gap is closed
 _TRIES = 12  # advances until it is
-_AWAY = 2.0  # cells from where fronts meet, beyond which their rates tell how fast all grow
 _MOST = 0.75  # of a cell: gap that may be left where the fronts speed up towards each other
 
 _INTEGRATORS = {"euler": euler, "pec": fronts}
@@ -176,7 +174,7 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     ]
     return replace(
         plan, part=way, cycles=cycles, error=cycle_error, cracks=tuple(joined_now.cracks),
-        apart=tuple(joined_now.cracks_apart), joins=tuple(joins_of_step), gain=gain,
+        apart=tuple(joined_now.cracks_apart), joins=tuple(joins_of_step),
     )  # fmt: skip
 
 
@@ -298,10 +296,10 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
         with suppress(GeometryError):  # a gap that cannot be closed so is as all fronts leave it
             cracks_beside = _cracks_after(rule, step, plan, share)
             crack, cracks_apart = crack_without_gap(cracks_beside), cracks_beside
-        x, gain = gap.x, _gain(step, cracks_apart, body.mesh, m)
-        cycles = time * plan.cycles / gain
+        x = gap.x
+        cycles = time * plan.cycles / _gain(step, cracks_apart, body.mesh, m)
     else:
-        (c, f), gain = (ligament.crack, ligament.front), 1.0
+        c, f = ligament.crack, ligament.front
         stations = solves_of(step)[0]
         radii = _radii(step, ligament, body.mesh)
         cycles, advance, _ = closing_annulus(*radii, ligament.rates, m)
@@ -320,7 +318,7 @@ def _with_ligament_broken(rule: GrowthRule, step: Step, plan: Plan, body: Body) 
     return replace(
         plan, part=min(way, 1.0), cycles=cycles, error=UNKNOWN_OF_FRONTS * cycles,
         cracks=tuple(cracks_now),
-        apart=tuple(cracks_apart), joins=(join,), gain=gain, limit="", refusal="",
+        apart=tuple(cracks_apart), joins=(join,), limit="", refusal="",
     )  # fmt: skip
 
 
@@ -538,42 +536,14 @@ def correct_join(rule: GrowthRule, step: Step, rates: Rates, identities: Identit
 
 
 def _share_of_cycles(step: Step, plan: Plan, result: Corrected, body: Body) -> float:
-    """Cycles of a meeting by the rates after it, over those before."""
-    closed_share = _share_of_ligament(step, plan, result, body)
-    if closed_share is not None:
-        return closed_share
-    gain = _gain_beside(step, plan, result, body)
-    return 1.0 if gain is None else plan.gain / gain
-
-
-def _gain_beside(step: Step, plan: Plan, result: Corrected, body: Body) -> float | None:
-    """Mean rate of an advance over that at its beginning, of fronts away from where some met.
-
-    Rates grow exponentially along the way; places count by it. None where there are none.
-    """
-    stations, solves = solves_of(step)
-    rate, later_rate = solves.rate[-1], result.solves.rate[-1]
-    size, x = body.cell_size(stations.x), stations.x + plan.part * plan.move
-    distance, row = cKDTree(result.stations.x).query(x)
-    meeting_places = np.array([join.point for join in plan.joins])
-    way_to_meeting = cKDTree(meeting_places).query(stations.x)[0]
-    is_beside = (distance < size) & (way_to_meeting > _AWAY * size + plan.largest)
-    is_beside &= (plan.arc > 0) & (rate > 0)
-    ratio = later_rate[row] / np.where(rate > 0, rate, 1.0)
-    is_beside &= np.isfinite(ratio) & (ratio > 0)
-    if not is_beside.any():
-        return None
-    time_share = exprel(-np.log(ratio[is_beside]))
-    return float(1 / np.average(time_share, weights=plan.arc[is_beside]))
-
-
-def _share_of_ligament(step: Step, plan: Plan, result: Corrected, body: Body) -> float | None:
-    """The same of a ligament that broke inside a crack; None where none did."""
+    """Cycles of a ligament that broke inside a crack by the rates after it, over those before."""
     c = plan.joins[0].cracks[0]
     if set(plan.joins[0].cracks) != {c} or len(plan.cracks) != len(step.corrected):
-        return None
+        return 1.0
     m = solves_of(step)[1].exponent
     later_rate = result.solves.rate[-1][result.stations.crack == c]
+    if not (len(later_rate) and np.isfinite(later_rate).all() and later_rate.mean() > 0):
+        return 1.0
     lines = [set(line.tolist()) for line in plan.cracks[c].fronts or ()]
     waiting_lines = [line.tolist() for line in plan.apart[c].fronts or ()]
     for ligament in _ligaments(step, plan, body):
@@ -582,12 +552,11 @@ def _share_of_ligament(step: Step, plan: Plan, result: Corrected, body: Body) ->
             continue
         radii = _radii(step, ligament, body.mesh)
         cycles, _, rate = closing_annulus(*radii, ligament.rates, m)
-        is_known = len(later_rate) > 0 and np.isfinite(later_rate).all() and later_rate.mean() > 0
-        if rate == 0 or not is_known:
+        if rate == 0:
             return 1.0
         softening = float(later_rate.mean()) / rate
         return closing_annulus(*radii, ligament.rates, m, softening)[0] / cycles
-    return None
+    return 1.0
 
 
 def _faces_near(cracks: Sequence[Crack], body: Body) -> list[FaceAhead]:

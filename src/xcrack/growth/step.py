@@ -187,8 +187,6 @@ class Plan:
         Of the advance that is made: fronts that meet end it.
     error : float
         Estimated error of the cycles, where they follow from a gap that closes.
-    gain : float
-        Mean rate over that at the beginning, which the cycles count on where fronts meet.
     joins : tuple of Join
     limit : str
         Why it cannot be taken: "arrest", "short" or "geometry"; empty where it can.
@@ -209,7 +207,6 @@ class Plan:
     apart: tuple[Crack, ...] = ()
     part: float = 1.0
     error: float = 0.0
-    gain: float = 1.0
     joins: tuple[Join, ...] = ()
     limit: str = ""
     refusal: str = ""
