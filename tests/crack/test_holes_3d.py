@@ -18,7 +18,7 @@ from xcrack.crack.advance_3d import advance_fronts
 from xcrack.crack.measures import area_inside, front_ends
 from xcrack.crack.stations import place_crack, stations_of
 from xcrack.mesh.gmsh_session import session
-from xcrack.mesh.locate import Body, cell_sizes
+from xcrack.mesh.locate import Body, cell_sizes, locate
 from xcrack.mesh.triangulation import face_areas
 
 H, HALF = 0.1, 0.7  # cells at the crack; half the width of the block
@@ -383,12 +383,54 @@ def test_both_arms_of_a_straight_front_across_a_hole_are_alike(tmp_path, x):
     assert np.sqrt(((one - other) ** 2).mean()) < 0.03 * one.mean()
 
 
+def cells_met(mesh: Mesh, x: float, z: float):
+    """Cells that a line along y runs through."""
+    y = np.linspace(-HALF, HALF, 4001)
+    at = np.column_stack([np.full(len(y), x), y, np.full(len(y), z)])
+    return np.setdiff1d(np.unique(locate(mesh, at)[0]), [-1])
+
+
+@pytest.mark.parametrize(
+    ("radius", "x"),
+    # Behind the middle of the hole, before its wall; before the middle, behind its wall.
+    [(0.13, -0.342), *slow((0.2, -0.5645), (0.1, -0.343), (0.13, -0.484), (0.2, -0.2336))],
+)
+def test_what_is_drawn_of_a_front_in_a_hole_does_not_matter(tmp_path, radius, x):
+    """Front cells are those of the line, and energy and K those of other vertices in the hole.
+
+    By the distance to its last vertex a front began anew where strips of both arms meet: up to 11
+    cells behind the hole had its functions, energy differed by .25 %, K from a cell on by 3 %.
+    """
+    half = np.sqrt(radius**2 - (x + 0.4) ** 2)
+    mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 1.0, radius), h=0.08, facets=8)
+    ends = [xc.displacement("top", (0.0, 0.0, 1e-3)), xc.displacement("bottom", (0.0, 0.0, 0.0))]
+    steel, energy, K = xc.Isotropic(E=210e3, nu=0.3), [], []
+    for in_hole in ([], [(x, 0.35 * half)], [(x, -0.6 * half), (x, 0.5 * half)]):
+        outline = np.array([(-3.0, -3.0), (x, -3.0), *in_hole, (x, 3.0), (-3.0, 3.0)])
+        crack = xc.plane_crack(np.column_stack([outline, np.full(len(outline), 0.011)]))
+        solution = xc.solve(xc.Problem(mesh, steel, [crack], supports=ends, order=1))
+        of_fronts = np.unique(np.concatenate(solution.space.cuts[0].level_set.tip_cells))
+        assert np.isin(cells_met(solution.space.mesh, x, 0.011), of_fronts).all()
+        corners = solution.space.mesh.points[solution.space.mesh.cells[of_fronts]]
+        for i, level in ((0, x), (2, 0.011)):
+            assert (corners[..., i].min(axis=1) <= level + 1e-9).all()
+            assert (corners[..., i].max(axis=1) >= level - 1e-9).all()
+        energy.append(solution.energy)
+        sif = xc.stress_intensity(solution)
+        order = np.argsort(sif.x[:, 1])
+        away = np.linspace(half + 0.08, 0.6, 50)  # a cell beside the hole and farther
+        K += [np.interp(y, sif.x[order, 1], sif.K_I[order]).mean() for y in (-away, away)]
+    assert np.ptp(energy) < 1.5e-4 * np.mean(energy)
+    assert np.ptp(K) < 0.015 * np.mean(K)
+
+
 def test_K_beside_a_hole_smaller_than_a_cell_is_that_of_a_strip(tmp_path):
     """A straight front across a hole of half a cell: domains of both parts end at its middle.
 
     K is that of a long strip pulled apart (Rice, 1967), K² = E' G with the energy of the strip far
-    ahead, between plane stress (free sides) and plane strain. Beside the hole 11 % are left for
-    the first place; domains that reached through the hole gave four times as much.
+    ahead, between plane stress (free sides) and plane strain, to the 1 % that cells leave. Beside
+    the hole it is 8 % higher (cells of half the size, order 2), alike on both sides; it was 1 and
+    11 % while points past the end of a front took their distance to that for one along the crack.
     """
     E, nu, pull, height = 210e3, 0.3, 1e-3, 0.6
     mesh = block(tmp_path / "hole.msh", (-0.4, 0, -0.5, 0, 0, 1, 0.05), h=0.12, facets=8)
@@ -402,8 +444,10 @@ def test_K_beside_a_hole_smaller_than_a_cell_is_that_of_a_strip(tmp_path):
     inner = sif.K_I[np.abs(sif.x[:, 1]) < 0.5]
     stress = E * np.sqrt(pull**2 / (2 * height) / (1 - nu**2))
     strain = E * np.sqrt((1 - nu) / (1 + nu) / (1 - 2 * nu) * pull**2 / (2 * height) / (1 - nu**2))
-    assert stress < inner.mean() < strain
-    assert inner == pytest.approx(inner.mean(), rel=0.12)
+    assert stress < inner.mean() < 1.01 * strain
+    assert inner == pytest.approx(inner.mean(), rel=0.08)
+    at_hole = inner[np.argsort(np.abs(sif.x[np.abs(sif.x[:, 1]) < 0.5, 1]))[:2]]
+    assert at_hole == pytest.approx(np.full(2, at_hole.mean()), rel=0.01)
 
 
 def test_a_penny_opens_around_a_hole_and_leaves_the_block(tmp_path):

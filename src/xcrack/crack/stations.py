@@ -239,7 +239,7 @@ def front_in_body(
     whole_curve = front_curve(x, frame, is_closed)
     curve, first, stop = whole_curve, 0, len(x)
     if not is_closed:
-        first, stop = _part_inside(x, rows_inside, is_inside)
+        first, stop = part_inside(x, rows_inside, is_inside)
         if stop - first < len(x):
             curve = front_curve(x[first:stop], frame[first:stop], is_closed)
     at = curve.breaks[rows_inside - first]
@@ -259,12 +259,21 @@ def front_in_body(
     return FrontInBody(curve, ends, at, number, places, frames, whole_curve.arc(breaks))
 
 
-def _part_inside(
+def part_inside(
     x: Floats, rows_inside: Ints, is_inside: Callable[[Floats], Bools]
 ) -> tuple[int, int]:
     """First vertex of an open front to count, and the one behind the last.
 
     One beyond each end of the part in the body, where that does not end at a vertex.
+
+    Parameters
+    ----------
+    x : (m, 3) array, length
+        Vertices of the front.
+    rows_inside : (k,) array of int
+        Those in the body.
+    is_inside : callable
+        Which points (q, 3) lie in the body.
     """
     if not len(rows_inside):
         return 0, len(x)

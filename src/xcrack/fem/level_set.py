@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,8 +12,9 @@ from xcrack.base.errors import CoarseMeshError
 from xcrack.crack.crack import Crack, tip_frames
 from xcrack.crack.fronts import Front, front_frames
 from xcrack.crack.placing_2d import ON_MESH
+from xcrack.crack.stations import part_inside
 from xcrack.mesh.distances import TriangleTree, closest_in, front_distance, signed_in, triangle_tree
-from xcrack.mesh.locate import cells_around
+from xcrack.mesh.locate import cells_around, contains
 from xcrack.mesh.mesh import Mesh, local_facets
 from xcrack.mesh.simplex import boxes_meet, simplex_rule
 from xcrack.mesh.triangulation import face_normals, rim, ruled_strip, unit
@@ -374,7 +376,7 @@ _STRAIGHT = 1e-6  # offset as a share of a cell, below which a front or a surfac
 _CHORDS = 12  # chords over which their offset is averaged
 _NO_CUT = 0.5  # error of phi as a share of a cell, from which on that is not cut by the crack
 _OFF_SURFACE = 0.3  # of an edge: bends leave .23 between its cut and the surface
-_LONGEST = 1.5  # cells; no distance changes more within one
+_BEYOND, _OTHER = 1, 2  # points past the ends of a front, and ahead of another front
 _PASSES = 12  # towards the mean square: leaves a thirtieth of the slowest part
 
 
@@ -408,11 +410,15 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
 
     phi, triangle, at_end = distance_to(mesh.points, band)
     label = np.where(triangle >= 0, surface.label[triangle], 0)
-    fronts = front_frames(crack)
+    fronts = _fronts_led_on(front_frames(crack), mesh)
     far_distance = 10 * mesh.extent
     psi = np.empty((len(fronts), mesh.n_points))
+    part = np.empty(psi.shape, dtype=np.int64)
     for k, front in enumerate(fronts):
-        psi[k] = _front_distance(mesh.points, phi, label == k + 1, front, band, far_distance)
+        psi[k], is_past = _front_distance(
+            mesh.points, phi, label == k + 1, front, band, far_distance
+        )
+        part[k] = np.where((label > 0) & (label != k + 1), _OTHER, is_past * _BEYOND)
     mouth = np.where(at_end & (label == 0), np.abs(phi), -far_distance)
     shift = _surface_shift(mesh, phi, at_end, tree, distance_to)
     phi = snap_to_vertices(mesh, phi + shift)
@@ -420,11 +426,13 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     if surface.faces is not None:
         near_edge &= _is_cut_on_surface(mesh, phi, near_edge, tree)
     for k, front in enumerate(fronts):
-        psi[k] = _shifted_psi(mesh, phi, psi[k], near_edge, front, band)
-    tip_cells = tuple(_front_cells(mesh, phi, p, near_edge) for p in psi)
+        psi[k] = _shifted_psi(mesh, phi, psi[k], part[k], near_edge, front, band)
+    tip_cells = tuple(
+        _front_cells(mesh, phi, *of_front, near_edge) for of_front in zip(psi, part, strict=True)
+    )
     if surface.faces is not None:
         _check_front_cells(fronts, tip_cells)
-    x_front = np.array([front.x[0] for front in fronts]).reshape(-1, mesh.dim)
+    x_front = np.array([front.x[1] for front in fronts]).reshape(-1, mesh.dim)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x_front), lock(mouth), lock(near_edge))
 
 
@@ -469,6 +477,59 @@ def _largest_cells(mesh: Mesh, crack: Crack) -> float:
     return float(mesh.cell_size[nearest_cells].max())
 
 
+def front_up_to_walls(front: Front, mesh: Mesh) -> Front:
+    """A front up to the first vertices outside the body; its frames there are those of its sides.
+
+    Parameters
+    ----------
+    front : Front
+    mesh : Mesh
+
+    Returns
+    -------
+    Front
+    """
+    if front.is_closed:
+        return front
+    inner_points = np.nonzero(contains(mesh, front.x))[0]
+    first, stop = part_inside(front.x, inner_points, partial(contains, mesh))
+    x, frame = front.x[first:stop], np.array(front.frame[first:stop])
+    for end, along in ((0, x[1] - x[0]), (-1, x[-1] - x[-2])):
+        normal = unit(frame[end, 1] - (frame[end, 1] @ along) * along / (along @ along))
+        frame[end] = np.stack([np.cross(normal, unit(along)), normal, unit(along)])
+    s = front.s[first:stop] - front.s[first]
+    return Front(lock(x), lock(frame), False, lock(s), lock(front.number[first:stop]))
+
+
+def _fronts_led_on(fronts: list[Front], mesh: Mesh) -> list[Front]:
+    """Fronts from the first vertex outside the body, or the end, led straight on at open ends.
+
+    What is drawn farther outside, as in a hole, is no part of the body and must not matter. They
+    are led on by a cell, but no farther than half the way to where another front begins: points
+    beside the wall of a hole, past the last vertex, see the front as it comes through the wall.
+    """
+    parts = [front_up_to_walls(front, mesh) for front in fronts]
+    result = []
+    for k, front in enumerate(parts):
+        if front.is_closed:
+            result.append(front)
+            continue
+        x, frame = front.x, np.array(front.frame)
+        elsewhere = [parts[j].x for j in range(len(parts)) if j != k]
+        led_on = []
+        for end, neighbour, sign in ((0, 1, -1.0), (-1, -2, 1.0)):
+            along = unit(sign * (x[end] - x[neighbour]))
+            gap = np.linalg.norm(np.concatenate([x[[-1 - end]], *elsewhere]) - x[end], axis=1).min()
+            size = float(mesh.cell_size[mesh.cell_tree.query(x[end])[1]])
+            led_on.append(x[end] + sign * min(size, gap / 2) * along)
+        x = np.concatenate([led_on[:1], x, led_on[1:]])
+        frame = frame[np.clip(np.arange(len(x)) - 1, 0, len(frame) - 1)]
+        s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+        number = np.concatenate([[-1], front.number, [-1]])
+        result.append(Front(lock(x), lock(frame), False, lock(s), lock(number)))
+    return result
+
+
 def _front_distance(
     points: Floats,
     phi: Floats,
@@ -476,8 +537,8 @@ def _front_distance(
     front: Front,
     band: float,
     far_distance: float,
-) -> Floats:
-    """Distance to one front along the surface, positive ahead."""
+) -> tuple[Floats, Bools]:
+    """Distance to a front along the surface, positive ahead; which points lie past its ends."""
     r, segment, position = front_distance(points, front.x, front.is_closed, band)
     has_segment = segment >= 0
     psi = np.where(is_ahead, far_distance, -far_distance)
@@ -487,18 +548,25 @@ def _front_distance(
     flat_rows = rows[root < _FLAT * r[rows]]
     foot, direction = _foot(front, segment[flat_rows], position[flat_rows])
     psi[flat_rows] = np.einsum("qd,qd->q", points[flat_rows] - foot, direction)
-    return psi
+    is_last = (segment == 0) | (segment == len(front.x) - 2)
+    return psi, is_last & (not front.is_closed)
 
 
 def _shifted_psi(
-    mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools, front: Front, band: float
+    mesh: Mesh,
+    phi: Floats,
+    psi: Floats,
+    part: Ints,
+    near_edge: Bools,
+    front: Front,
+    band: float,
 ) -> Floats:
     """Shift psi so that the front that the cells see is the given one in the mean.
 
     In a cell the front is straight: a curved one would lose the slivers between chords and arc,
     1 % of the radius of a penny of five cells. The loss is measured at the middle of each chord.
     """
-    cells = _front_cells(mesh, phi, psi, near_edge)
+    cells = _front_cells(mesh, phi, psi, part, near_edge)
     middle, length = _chords(mesh, phi, psi, cells)
     if not len(middle):
         return psi
@@ -610,7 +678,7 @@ def _surface_shift(
     return shift
 
 
-def _bounds(mesh: Mesh, values: Floats | Bools) -> tuple[Floats, Floats]:
+def _bounds(mesh: Mesh, values: Floats | Bools | Ints) -> tuple[Floats, Floats]:
     """Smallest and largest value at the corners of each cell; along rows of four is slow."""
     corners = np.ascontiguousarray(values[mesh.cells].T)
     return corners.min(axis=0), corners.max(axis=0)
@@ -649,10 +717,14 @@ def _foot(front: Front, segment: Ints, position: Floats) -> tuple[Floats, Floats
     return foot, direction / np.linalg.norm(direction, axis=1, keepdims=True)
 
 
-def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints:
-    """Cells whose closed set meets phi = psi = 0."""
+def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, part: Ints, near_edge: Bools) -> Ints:
+    """Cells whose closed set meets phi = psi = 0, by the points of which the front is the nearest.
+
+    What lies ahead of another front says nothing of this one, and cells all past an end have none.
+    """
     phi_min, phi_max = _bounds(mesh, phi)
-    rows = np.nonzero((phi_min <= 0) & (phi_max >= 0))[0]
+    is_beside = _bounds(mesh, part)[0] == 0
+    rows = np.nonzero((phi_min <= 0) & (phi_max >= 0) & is_beside)[0]
     edge = mesh.cell_to_edge[rows]
     a, b = mesh.edges[edge, 0], mesh.edges[edge, 1]
     is_crossed = phi[a] * phi[b] < 0
@@ -660,15 +732,14 @@ def _front_cells(mesh: Mesh, phi: Floats, psi: Floats, near_edge: Bools) -> Ints
     with np.errstate(divide="ignore", invalid="ignore"):
         t = phi[a] / (phi[a] - phi[b])
         at_edge = np.where(is_crossed, (1 - t) * psi[a] + t * psi[b], np.nan)
+    at_edge = np.where((part[a] == _OTHER) | (part[b] == _OTHER), np.nan, at_edge)
     corner = mesh.cells[rows]
-    at_corner = np.where(phi[corner] == 0, psi[corner], np.nan)
+    at_corner = np.where((phi[corner] == 0) & (part[corner] != _OTHER), psi[corner], np.nan)
     levels = np.concatenate([at_edge, at_corner], axis=1)
     levels = np.where(np.abs(levels) < _AT * mesh.cell_size[rows][:, None], 0.0, levels)
     psi_min = np.where(np.isnan(levels), np.inf, levels).min(axis=1)
     psi_max = np.where(np.isnan(levels), -np.inf, levels).max(axis=1)
-    # Where strips of two fronts meet, psi of each changes its sign away from its front: it jumps.
-    is_front = psi_max - psi_min <= _LONGEST * mesh.cell_size[rows]
-    return rows[is_close & is_front & (psi_min <= 0) & (psi_max >= 0)]
+    return rows[is_close & (psi_min <= 0) & (psi_max >= 0)]
 
 
 __all__ = []
