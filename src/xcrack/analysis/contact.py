@@ -147,23 +147,19 @@ def solve_contact(
     sets, dual = 0, None
     friction_solution: FrictionSolution | None = None
     contacts: list[Multipliers] = []
+    u: Floats | None
     if problem.contact == "off":
-        u: Floats | None = engine.solve(f, u_imposed)
-        pending_cracks: list[int] = []
+        u = engine.solve(f, u_imposed)
+        pending_cracks = []
     else:
         # A factorisation needs no look at open faces where all cracks get multipliers anyway.
         is_certain = problem.contact == "on" and isinstance(engine, DirectSystem)
         closed_cracks = [
             c for c in range(n) if len(model.lips[c]) and (is_certain or reuse.was_closed(c))
         ]
-        u, is_exact = engine.first_look(f, u_imposed, bool(closed_cracks))
+        u, pending_cracks = _first_look(problem, model, engine, f, u_imposed, closed_cracks, trials)
         if u is None:
-            pending_cracks = expected_cracks = closed_cracks
-        else:
-            pending_cracks = _overlapping_cracks(problem, model, u, spaces, trials)
-            if not pending_cracks and not is_exact:
-                u = engine.solve(f, u_imposed, u)
-                pending_cracks = _overlapping_cracks(problem, model, u, spaces, trials)
+            expected_cracks = closed_cracks
     u_opened = u
     while pending_cracks:
         for c in pending_cracks:
@@ -213,6 +209,47 @@ def solve_contact(
         )
         dual = dual[np.ix_(is_retained, is_retained)]
     return ContactSolution(u, tuple(spaces), tuple(pressure), tuple(closed_sets), sets, dual)
+
+
+def open_solution(
+    problem: Problem, model: System, engine: Engine, f: Floats, u_imposed: Floats
+) -> ContactSolution | None:
+    """The solution without pressures; None where faces overlap in it.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : System
+    engine : Engine
+    f, u_imposed : (n_dof, states) arrays
+        Loads, and displacements that supports impose.
+    """
+    u, pending_cracks = _first_look(problem, model, engine, f, u_imposed, [], {})
+    if u is None or pending_cracks:
+        return None
+    n = len(model.lips)
+    return ContactSolution(u, (None,) * n, (None,) * n, (None,) * n, 0)
+
+
+def _first_look(
+    problem: Problem,
+    model: System,
+    engine: Engine,
+    f: Floats,
+    u_imposed: Floats,
+    closed_cracks: list[int],
+    trials: dict[int, Multipliers],
+) -> tuple[Floats | None, list[int]]:
+    """Displacements of open faces and the cracks that overlap; exact where none does."""
+    spaces: list[Multipliers | None] = [None] * len(model.lips)
+    u, is_exact = engine.first_look(f, u_imposed, bool(closed_cracks))
+    if u is None:
+        return None, closed_cracks
+    pending_cracks = _overlapping_cracks(problem, model, u, spaces, trials)
+    if not pending_cracks and not is_exact:
+        u = engine.solve(f, u_imposed, u)
+        pending_cracks = _overlapping_cracks(problem, model, u, spaces, trials)
+    return u, pending_cracks
 
 
 def _solve_friction(

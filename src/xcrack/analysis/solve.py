@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
-from xcrack.analysis.contact import contact_of, solve_contact
+from xcrack.analysis.contact import contact_of, open_solution, solve_contact
 from xcrack.analysis.friction import slip_of
 from xcrack.analysis.plan import check_memory
 from xcrack.analysis.report import alarms_of_solutions, report
@@ -31,7 +31,7 @@ from xcrack.fem.loads import (
 )
 from xcrack.fem.system import System, build
 from xcrack.linalg.direct import Solver, system
-from xcrack.linalg.engine import Engine, SolverState, takes_iterations
+from xcrack.linalg.engine import Engine, SolverState, is_open_first, takes_iterations
 from xcrack.linalg.iterative import iterative_system
 from xcrack.linalg.products import times
 from xcrack.linalg.rigid_motion import (
@@ -196,14 +196,21 @@ def _solve_states(
     is_fixed = model.imposed_values.is_fixed.copy()
     free_motions = _fixed_unknowns(model, is_fixed)
     motion = free_motion(model.space, is_fixed, free_motions[1])
-    engine = _engine(problem, model, is_fixed, motion, solver, reuse)
     f, imbalance = balanced_loads(model.space, motion, np.stack([case.f for case in cases], axis=1))
     u_imposed = np.stack([case.u_imposed for case in cases], axis=1)
     load_states = [case.load_state for case in cases]
     start = reuse or SolverState()
-    contact_solution = solve_contact(
-        problem, model, engine, f, u_imposed, start, load_states, is_repeated
-    )
+    was_closed = any(start.was_closed(c) for c in range(len(problem.cracks)))
+    # Faces with friction that stay open need no factor.
+    has_contact = solver is not None or was_closed or not is_open_first(problem, model.space.n_dof)
+    engine = _engine(problem, model, is_fixed, motion, solver, reuse, has_contact)
+    contact_solution = None if has_contact else open_solution(problem, model, engine, f, u_imposed)
+    if contact_solution is None:
+        if not has_contact:
+            engine = _engine(problem, model, is_fixed, motion, solver, reuse, True)
+        contact_solution = solve_contact(
+            problem, model, engine, f, u_imposed, start, load_states, is_repeated
+        )
     u = contact_solution.u
     if motion.modes.shape[1]:
         u = without_motion(motion, u)
@@ -270,10 +277,11 @@ def _engine(
     motion: Motion,
     solver: Solver | None,
     reuse: SolverState | None,
+    has_contact: bool,
 ) -> Engine:
     """A factorisation, or in 3D above some size conjugate gradients."""
     space_, basis = model.space, problem.numerics.tip_basis
-    if solver is None and takes_iterations(problem, space_.n_dof):
+    if solver is None and takes_iterations(problem, space_.n_dof, has_contact):
         # Rows beside the crack are enough where no basis is changed but that of single nodes.
         by_parts = space_.order == 1 and basis is None
         return iterative_system(
