@@ -148,9 +148,9 @@ def solve_contact(
     friction_solution: FrictionSolution | None = None
     contacts: list[Multipliers] = []
     u: Floats | None
+    pending_cracks: list[int] = []
     if problem.contact == "off":
         u = engine.solve(f, u_imposed)
-        pending_cracks = []
     else:
         # A factorisation needs no look at open faces where all cracks get multipliers anyway.
         is_certain = problem.contact == "on" and isinstance(engine, DirectSystem)

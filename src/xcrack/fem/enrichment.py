@@ -5,11 +5,11 @@ from scipy.spatial import cKDTree
 
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.crack.crack import Crack, crack_length, tip_frames
-from xcrack.crack.fronts import Front, front_frames
+from xcrack.crack.fronts import front_frames
 from xcrack.crack.junctions_3d import are_opposite
 from xcrack.crack.measures import surface_size
 from xcrack.fem.cut import Cut
-from xcrack.fem.level_set import front_up_to_walls
+from xcrack.fem.level_set import front_up_to_walls, runs_on
 from xcrack.mesh.locate import Body, cells_within, nearest_boundary
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.simplex import cell_nodes, facet_nodes, leg_size
@@ -70,8 +70,6 @@ _SHARE_OF_FRONT, _ASIDE, _APART = 0.65, 0.7, 0.45
 # change nothing, and take a third more time.
 _LEAST_OF_FRONT = 2.0
 _RANGE = {1: (2.6, 3.6), 2: (2.0, 2.0)}
-_RUNS_ON = 1.0  # cells between the end of a front and another front that goes on from there
-_STRAIGHT_ON = 0.7  # cosine to the direction of a front at its end, in which another one goes on
 _EXIT = 1.5  # a front is near its exit where that is closer than this many distances to the side
 _SAMPLES = 24  # points of an open front at which the distance to the boundary is taken
 
@@ -245,26 +243,16 @@ def divided_points(mesh: Mesh, crack: Crack, cut: Cut, flags: list[Bools]) -> li
     phi, psi = cut.level_set.phi, cut.level_set.psi
     fronts = [front_up_to_walls(front, mesh) for front in front_frames(crack)]
     for j, front in enumerate(fronts):
-        for i, other in enumerate(fronts[:j]):
+        for i, other_front in enumerate(fronts[:j]):
             cell = leg_size(mesh, cut.level_set.tip_cells[j])
-            if front.is_closed or other.is_closed:
+            if front.is_closed or other_front.is_closed:
                 continue
-            if _runs_on(front, other, cell) or _runs_on(other, front, cell):
+            if runs_on(front, other_front, cell) or runs_on(other_front, front, cell):
                 common_points = result[i] & result[j]
                 is_nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])
                 result[i] = result[i] & ~(common_points & ~is_nearer)
                 result[j] = result[j] & ~(common_points & is_nearer)
     return result
-
-
-def _runs_on(front: Front, other: Front, cell: float) -> bool:
-    """Whether another front begins straight ahead of the end of a front, or within a cell of it.
-
-    What is drawn between them in a hole does not matter.
-    """
-    way = other.x[0] - front.x[-1]
-    gap = float(np.linalg.norm(way))
-    return gap < _RUNS_ON * cell or bool(way @ front.frame[-1, 2] > _STRAIGHT_ON * gap)
 
 
 def node_level(mesh: Mesh, order: int, phi: Floats) -> Floats:

@@ -376,6 +376,8 @@ _STRAIGHT = 1e-6  # offset as a share of a cell, below which a front or a surfac
 _CHORDS = 12  # chords over which their offset is averaged
 _NO_CUT = 0.5  # error of phi as a share of a cell, from which on that is not cut by the crack
 _OFF_SURFACE = 0.3  # of an edge: bends leave .23 between its cut and the surface
+_RUNS_ON = 1.0  # cells between the end of a front and another front that goes on from there
+_STRAIGHT_ON = 0.7  # cosine to the direction of a front at its end, in which another one goes on
 _BEYOND, _OTHER = 1, 2  # points past the ends of a front, and ahead of another front
 _PASSES = 12  # towards the mean square: leaves a thirtieth of the slowest part
 
@@ -432,7 +434,7 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     )
     if surface.faces is not None:
         _check_front_cells(fronts, tip_cells)
-    x_front = np.array([front.x[1] for front in fronts]).reshape(-1, mesh.dim)
+    x_front = np.array([front.x[0] for front in front_frames(crack)]).reshape(-1, mesh.dim)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x_front), lock(mouth), lock(near_edge))
 
 
@@ -494,39 +496,60 @@ def front_up_to_walls(front: Front, mesh: Mesh) -> Front:
     inner_points = np.nonzero(contains(mesh, front.x))[0]
     first, stop = part_inside(front.x, inner_points, partial(contains, mesh))
     x, frame = front.x[first:stop], np.array(front.frame[first:stop])
-    for end, along in ((0, x[1] - x[0]), (-1, x[-1] - x[-2])):
-        normal = unit(frame[end, 1] - (frame[end, 1] @ along) * along / (along @ along))
-        frame[end] = np.stack([np.cross(normal, unit(along)), normal, unit(along)])
+    for end, tangent in ((0, x[1] - x[0]), (-1, x[-1] - x[-2])):
+        normal = unit(frame[end, 1] - (frame[end, 1] @ tangent) * tangent / (tangent @ tangent))
+        frame[end] = np.stack([np.cross(normal, unit(tangent)), normal, unit(tangent)])
     s = front.s[first:stop] - front.s[first]
     return Front(lock(x), lock(frame), False, lock(s), lock(front.number[first:stop]))
 
 
-def _fronts_led_on(fronts: list[Front], mesh: Mesh) -> list[Front]:
-    """Fronts from the first vertex outside the body, or the end, led straight on at open ends.
+def runs_on(front: Front, next_front: Front, cell: float) -> bool:
+    """Whether another front begins straight ahead of the end of a front, or within a cell of it.
 
-    What is drawn farther outside, as in a hole, is no part of the body and must not matter. They
-    are led on by a cell, but no farther than half the way to where another front begins: points
-    beside the wall of a hole, past the last vertex, see the front as it comes through the wall.
+    Parameters
+    ----------
+    front, next_front : Front
+        Open, up to the walls: what is drawn between them in a hole does not matter.
+    cell : float, length
+    """
+    way = next_front.x[0] - front.x[-1]
+    gap = float(np.linalg.norm(way))
+    return gap < _RUNS_ON * cell or bool(way @ front.frame[-1, 2] > _STRAIGHT_ON * gap)
+
+
+def _fronts_led_on(fronts: list[Front], mesh: Mesh) -> list[Front]:
+    """Fronts that at a hole, behind which another goes on, end where they come through its wall.
+
+    What is drawn farther in the hole is no part of the body and must not matter. From the first
+    vertex outside they are led straight on by a cell, but at most half the way to the other front:
+    points beside the wall, past the last vertex, see the front as it comes through. Vertices that
+    are led on have the number -1.
     """
     parts = [front_up_to_walls(front, mesh) for front in fronts]
     result = []
-    for k, front in enumerate(parts):
-        if front.is_closed:
-            result.append(front)
-            continue
-        x, frame = front.x, np.array(front.frame)
-        elsewhere = [parts[j].x for j in range(len(parts)) if j != k]
-        led_on = []
-        for end, neighbour, sign in ((0, 1, -1.0), (-1, -2, 1.0)):
-            along = unit(sign * (x[end] - x[neighbour]))
-            gap = np.linalg.norm(np.concatenate([x[[-1 - end]], *elsewhere]) - x[end], axis=1).min()
-            size = float(mesh.cell_size[mesh.cell_tree.query(x[end])[1]])
-            led_on.append(x[end] + sign * min(size, gap / 2) * along)
-        x = np.concatenate([led_on[:1], x, led_on[1:]])
-        frame = frame[np.clip(np.arange(len(x)) - 1, 0, len(frame) - 1)]
+    for k, (front, part) in enumerate(zip(fronts, parts, strict=True)):
+        others = (
+            [] if front.is_closed else [f for f in parts[:k] + parts[k + 1 :] if not f.is_closed]
+        )
+        x, frame, number = front.x, np.array(front.frame), front.number
+        for end, sign in ((0, -1.0), (-1, 1.0)):
+            size = float(mesh.cell_size[mesh.cell_tree.query(part.x[end])[1]])
+            pairs = [(part, other) if end else (other, part) for other in others]
+            gaps = [
+                float(np.linalg.norm(a.x[-1] - b.x[0])) for a, b in pairs if runs_on(a, b, size)
+            ]
+            if not gaps:
+                continue
+            at_wall = int(np.nonzero(number == part.number[end])[0][0])
+            rows = slice(at_wall + 1) if end else slice(at_wall, None)
+            x, frame, number = x[rows], frame[rows], number[rows]
+            frame[end] = part.frame[end]
+            ahead = x[end] + sign * min(size, min(gaps) / 2) * frame[end, 2]
+            place = len(x) if end else 0
+            x, number = np.insert(x, place, ahead, axis=0), np.insert(number, place, -1)
+            frame = np.insert(frame, place, frame[end], axis=0)
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
-        number = np.concatenate([[-1], front.number, [-1]])
-        result.append(Front(lock(x), lock(frame), False, lock(s), lock(number)))
+        result.append(Front(lock(x), lock(frame), front.is_closed, lock(s), lock(number)))
     return result
 
 
@@ -548,8 +571,8 @@ def _front_distance(
     flat_rows = rows[root < _FLAT * r[rows]]
     foot, direction = _foot(front, segment[flat_rows], position[flat_rows])
     psi[flat_rows] = np.einsum("qd,qd->q", points[flat_rows] - foot, direction)
-    is_last = (segment == 0) | (segment == len(front.x) - 2)
-    return psi, is_last & (not front.is_closed)
+    led_on = front.number < 0
+    return psi, (led_on[0] & (segment == 0)) | (led_on[-1] & (segment == len(front.x) - 2))
 
 
 def _shifted_psi(

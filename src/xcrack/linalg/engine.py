@@ -319,8 +319,8 @@ def takes_iterations(problem: Problem, n: int, has_contact: bool = True) -> bool
     linear_solver = problem.numerics.linear
     if linear_solver != "auto":
         return linear_solver == "iterative"
-    rubs_there = has_contact and may_rub(problem)
-    n_direct = _DIRECT_WITH_FRICTION if rubs_there else _DIRECT[problem.order or 1]
+    is_rubbing = has_contact and may_rub(problem)
+    n_direct = _DIRECT_WITH_FRICTION if is_rubbing else _DIRECT[problem.order or 1]
     is_large = problem.mesh.dim == 3 and n > n_direct
     if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
         return False  # quadratic functions of both cracks nearly vanish together beside a junction
