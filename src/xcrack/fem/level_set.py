@@ -528,13 +528,15 @@ def _fronts_led_on(fronts: list[Front], mesh: Mesh) -> list[Front]:
     parts = [front_up_to_walls(front, mesh) for front in fronts]
     result = []
     for k, (front, part) in enumerate(zip(fronts, parts, strict=True)):
-        others = (
+        open_fronts = (
             [] if front.is_closed else [f for f in parts[:k] + parts[k + 1 :] if not f.is_closed]
         )
         x, frame, number = front.x, np.array(front.frame), front.number
         for end, sign in ((0, -1.0), (-1, 1.0)):
             size = float(mesh.cell_size[mesh.cell_tree.query(part.x[end])[1]])
-            pairs = [(part, other) if end else (other, part) for other in others]
+            pairs = [
+                (part, next_front) if end else (next_front, part) for next_front in open_fronts
+            ]
             gaps = [
                 float(np.linalg.norm(a.x[-1] - b.x[0])) for a, b in pairs if runs_on(a, b, size)
             ]
@@ -544,9 +546,9 @@ def _fronts_led_on(fronts: list[Front], mesh: Mesh) -> list[Front]:
             rows = slice(at_wall + 1) if end else slice(at_wall, None)
             x, frame, number = x[rows], frame[rows], number[rows]
             frame[end] = part.frame[end]
-            ahead = x[end] + sign * min(size, min(gaps) / 2) * frame[end, 2]
+            new_place = x[end] + sign * min(size, min(gaps) / 2) * frame[end, 2]
             place = len(x) if end else 0
-            x, number = np.insert(x, place, ahead, axis=0), np.insert(number, place, -1)
+            x, number = np.insert(x, place, new_place, axis=0), np.insert(number, place, -1)
             frame = np.insert(frame, place, frame[end], axis=0)
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
         result.append(Front(lock(x), lock(frame), front.is_closed, lock(s), lock(number)))
