@@ -24,6 +24,7 @@ from xcrack.base.errors import (
 )
 from xcrack.crack.crack import kink_numbers
 from xcrack.crack.measures import exit_ahead
+from xcrack.crack.meetings import LEAST
 from xcrack.fatigue.checks import law_exponent
 from xcrack.fatigue.cycle import Cycle
 from xcrack.growth.options import GrowthRule
@@ -48,6 +49,7 @@ from xcrack.model.problem import Problem
 
 _COARSEST = 1.3  # times the size that sees crack and room: error bars can just be had there
 _SLOPE = 0.25  # growth of cells with the distance from a tip, on the first mesh
+_ROOM = 2.0  # times the least advance in cells: a given da has cells that see it
 _LARGER = 1.25  # cells at an end over the size wanted there, from which on the mesh follows it
 
 
@@ -98,7 +100,10 @@ def follow(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
     step : Step
     """
     cells = rule.cells
-    if cells is None or not cells.moves.any():
+    no_places = np.zeros((0, rule.problem.mesh.dim))
+    cells = CellSizes(no_places, np.zeros(0), np.zeros(0, dtype=bool)) if cells is None else cells
+    longest_cell = np.inf if rule.da is None else rule.da / (_ROOM * LEAST)
+    if not cells.moves.any() and longest_cell == np.inf:
         return rule
     try:
         x = replace(rule.problem, cracks=plan_of(step).cracks).stations.x
@@ -106,7 +111,7 @@ def follow(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
         return rule
     if not len(x):
         return rule
-    size = cells.size_at(x)
+    size = np.minimum(cells.size_at(x), longest_cell)
     if (cell_sizes(rule.problem.mesh, x) <= _LARGER * size).all():
         return rule
     return _with_cells(first_rule, cells.with_ends(x, size), rule.meshes)

@@ -274,7 +274,7 @@ def growth_steps(rule: GrowthRule, steps_done: Sequence[Step] = ()) -> Generator
                 warn(kink)
             with notices.watch(last_step.index + 1) as messages:
                 cut = last_step if rule.max_size is None else _cut_at_size(rule, last_step)
-                next_rule = rule if rule.cells is None else follow(first_rule, rule, cut)
+                next_rule = rule if rule.tolerance is None else follow(first_rule, rule, cut)
                 reuse = reuse if next_rule is rule else reuse.without_matrices()
                 next_step, reuse, end = _step_after(next_rule, cut, reuse)
                 if next_step is None:
