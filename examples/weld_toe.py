@@ -102,8 +102,6 @@ def run(size):
 SIZE = 0.4 if QUICK else 0.3
 history = run(SIZE)
 print(history)
-for join in history.joins:
-    print(join)
 if not QUICK:
     # K where the fronts come out of the body is 5 % lower with cells of .4 mm, and the rate 14 %.
     coarse = run(0.4)
