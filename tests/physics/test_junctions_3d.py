@@ -459,7 +459,7 @@ BAD = {
     ),
     "along it": ([ONE, xc.arm(xc.penny_crack((0, 0, 0.03), (0.05, 0, 1), 0.4), 0, 1)],
         "2 degrees|Leave this arm out"),
-    "touches along an edge": ([ONE, upright(0.017)], "meet near .* one of them end on the other"),
+    "touches along an edge": ([ONE, upright(0.017)], "touch near .* one of them end on the other"),
     "touches along an edge from the other side": (
         [ONE, xc.arm(upright(0.017), 0, -side_above(ONE))],
         "wholly beyond crack 0",
@@ -474,7 +474,7 @@ BAD = {
                             (-0.6, 0.3, 0.017)]),
             upright(0.017),
         ],
-        "meet near .* as one surface",
+        "cross or touch near .* as one surface",
     ),
     "ends a third of a cell before a face": (
         [ONE, upright(0.067)], "two cracks run through the cell.* draw one on to the other"

@@ -714,10 +714,10 @@ def check_surfaces(cracks: tuple[Crack, ...], mesh: Mesh) -> None:
                         "as one surface, or leave out one that lies in the other."
                     )
                 raise GeometryError(
-                    f"cracks {i} and {j} meet near {at(meeting[0])}: let one of them end on the "
-                    f"other, arm(crack, on={i}, side=1), and where it goes on beyond give a second "
-                    "arm with side=-1; or end it a few cells before. Give two that share an "
-                    "edge as one surface."
+                    f"cracks {i} and {j} cross or touch near {at(meeting[0])}: let one of them end "
+                    f"on the other, arm(crack, on={i}, side=1), and where it goes on beyond give a "
+                    "second arm with side=-1; or end it a few cells before. Give two that share "
+                    "an edge as one surface."
                 )
     _check_apart(cracks, body)
 
