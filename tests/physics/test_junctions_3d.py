@@ -307,8 +307,10 @@ def test_K_of_arms_by_the_distance_to_the_junction(n, order, bounds):
     cracks = [large, xc.arm(small, 0, 1), xc.arm(small, 0, -1)]
     crossed = xc.solve(scene(cracks, n, order=order, contact="off"))
     sifs = [xc.stress_intensity(crossed, c) for c in (1, 2)]
-    x = np.abs(np.concatenate([sif.x for sif in sifs]) - centre)
-    K = np.concatenate([sif.K_I for sif in sifs]) / (2 * 100.0 * np.sqrt(0.3 / np.pi))
+    # Places on the junction have K of a fixed depth.
+    x = np.abs(np.concatenate([sif.x[~sif.at_surface] for sif in sifs]) - centre)
+    K = np.concatenate([sif.K_I[~sif.at_surface] for sif in sifs])
+    K /= 2 * 100.0 * np.sqrt(0.3 / np.pi)
     angle = np.degrees(np.arctan2(x[:, 2], x[:, 1]))
     error = np.abs(K / own(angle) - 1)
     parts = np.digitize(angle, (15.0, 45.0))
