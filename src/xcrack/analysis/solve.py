@@ -201,13 +201,13 @@ def _solve_states(
     load_states = [case.load_state for case in cases]
     start = reuse or SolverState()
     was_closed = any(start.was_closed(c) for c in range(len(problem.cracks)))
-    # Faces with friction that stay open need no factor.
-    has_contact = solver is not None or was_closed or not is_open_first(problem, model.space.n_dof)
-    engine = _engine(problem, model, is_fixed, motion, solver, reuse, has_contact)
-    contact_solution = None if has_contact else open_solution(problem, model, engine, f, u_imposed)
+    contact_solution = None
+    if solver is None and not was_closed and is_open_first(problem, model.space.n_dof):
+        # Faces with friction that stay open need no factor.
+        engine = _engine(problem, model, is_fixed, motion, solver, reuse, has_contact=False)
+        contact_solution = open_solution(problem, model, engine, f, u_imposed)
     if contact_solution is None:
-        if not has_contact:
-            engine = _engine(problem, model, is_fixed, motion, solver, reuse, True)
+        engine = _engine(problem, model, is_fixed, motion, solver, reuse, has_contact=True)
         contact_solution = solve_contact(
             problem, model, engine, f, u_imposed, start, load_states, is_repeated
         )

@@ -241,12 +241,12 @@ def divided_points(mesh: Mesh, crack: Crack, cut: Cut, flags: list[Bools]) -> li
     """
     result = list(flags)
     phi, psi = cut.level_set.phi, cut.level_set.psi
-    fronts = [front_up_to_walls(front, mesh) for front in front_frames(crack)]
-    for j, front in enumerate(fronts):
-        for i, other_front in enumerate(fronts[:j]):
-            cell = leg_size(mesh, cut.level_set.tip_cells[j])
-            if front.is_closed or other_front.is_closed:
-                continue
+    fronts = [(k, front) for k, front in enumerate(front_frames(crack)) if not front.is_closed]
+    if len(fronts) > 1:
+        fronts = [(k, front_up_to_walls(front, mesh)) for k, front in fronts]
+    for place, (j, front) in enumerate(fronts):
+        cell = leg_size(mesh, cut.level_set.tip_cells[j])
+        for i, other_front in fronts[:place]:
             if runs_on(front, other_front, cell) or runs_on(other_front, front, cell):
                 common_points = result[i] & result[j]
                 is_nearer = np.hypot(phi, psi[i]) <= np.hypot(phi, psi[j])

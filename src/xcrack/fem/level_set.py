@@ -412,7 +412,8 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
 
     phi, triangle, at_end = distance_to(mesh.points, band)
     label = np.where(triangle >= 0, surface.label[triangle], 0)
-    fronts = _fronts_led_on(front_frames(crack), mesh)
+    fronts_of_crack = front_frames(crack)
+    fronts = _fronts_led_on(fronts_of_crack, mesh)
     far_distance = 10 * mesh.extent
     psi = np.empty((len(fronts), mesh.n_points))
     part = np.empty(psi.shape, dtype=np.int64)
@@ -434,7 +435,7 @@ def surface_levels(mesh: Mesh, crack: Crack, reach: float) -> LevelSet:
     )
     if surface.faces is not None:
         _check_front_cells(fronts, tip_cells)
-    x_front = np.array([front.x[0] for front in front_frames(crack)]).reshape(-1, mesh.dim)
+    x_front = np.array([front.x[0] for front in fronts_of_crack]).reshape(-1, mesh.dim)
     return LevelSet(lock(phi), lock(psi), tip_cells, lock(x_front), lock(mouth), lock(near_edge))
 
 
@@ -525,6 +526,8 @@ def _fronts_led_on(fronts: list[Front], mesh: Mesh) -> list[Front]:
     points beside the wall, past the last vertex, see the front as it comes through. Vertices that
     are led on have the number -1.
     """
+    if sum(not front.is_closed for front in fronts) < 2:
+        return fronts
     parts = [front_up_to_walls(front, mesh) for front in fronts]
     result = []
     for k, (front, part) in enumerate(zip(fronts, parts, strict=True)):

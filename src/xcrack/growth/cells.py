@@ -99,9 +99,7 @@ def follow(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
         On the mesh that it begins with, and on that of the last step.
     step : Step
     """
-    cells = rule.cells
-    no_places = np.zeros((0, rule.problem.mesh.dim))
-    cells = CellSizes(no_places, np.zeros(0), np.zeros(0, dtype=bool)) if cells is None else cells
+    cells = rule.cells or CellSizes.none(rule.problem.mesh.dim)
     longest_cell = np.inf if rule.da is None else rule.da / (_ROOM * LEAST)
     if not cells.moves.any() and longest_cell == np.inf:
         return rule
@@ -231,9 +229,7 @@ def _cells_2d(cells: CellSizes | None, indicators: Indicators, target: float) ->
     cells_that_stay = CellSizes(
         centre[is_staying], target_size[is_staying], np.zeros(int(is_staying.sum()), dtype=bool)
     )
-    return (cells_that_stay if cells is None else cells.with_places(cells_that_stay)).with_ends(
-        tips, size
-    )
+    return (cells or CellSizes.none(2)).with_places(cells_that_stay).with_ends(tips, size)
 
 
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
@@ -256,8 +252,7 @@ def _cells_3d(cells: CellSizes | None, indicators: Indicators, target: float) ->
         is_of_crack = stations.crack == crack
         size[is_of_crack] = np.median(size[is_of_crack])
     size /= np.clip(excess, 1.0, _FINER**_POWER) ** (1 / _POWER)
-    no_cells = CellSizes(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
-    return (no_cells if cells is None else cells).with_ends(stations.x, size)
+    return (cells or CellSizes.none(3)).with_ends(stations.x, size)
 
 
 @dataclass(frozen=True)

@@ -218,6 +218,11 @@ class CellSizes:
     size: Floats
     moves: Bools
 
+    @classmethod
+    def none(cls, dim: int) -> "CellSizes":
+        """No places."""
+        return cls(np.zeros((0, dim)), np.zeros(0), np.zeros(0, dtype=bool))
+
     def size_at(self, x: Floats) -> Floats:
         """Of points `(k, d)`: that of the nearest place that moves; inf where none does."""
         if not self.moves.any():

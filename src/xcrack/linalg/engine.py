@@ -338,6 +338,7 @@ __all__ = [
     "Engine",
     "SolveCount",
     "StateContact",
+    "is_open_first",
     "may_rub",
     "takes_iterations",
 ]

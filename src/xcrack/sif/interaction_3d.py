@@ -525,15 +525,15 @@ def smooth_values(K: Floats, is_valid: Bools, is_closed: bool) -> Floats:
     steps = np.eye(count)
     for _ in range(_DIFFERENCE):
         steps = np.roll(steps, -1, axis=0) - steps if is_closed else np.diff(steps, axis=0)
-    smoothing = np.linalg.inv(np.eye(count) + _WEIGHTS[:, None, None] * (steps.T @ steps))
-    curves = np.einsum("wij,...jm->w...im", smoothing, K)
-    freedom = count - np.trace(smoothing, axis1=1, axis2=2)
-    V = np.moveaxis(np.square(curves - K).sum(axis=-2), 0, -1) / freedom**2
+    # In the modes of the differences all weights are factors between 0 and 1.
+    values, modes = np.linalg.eigh(steps.T @ steps)
+    factor = 1 / (1 + _WEIGHTS[:, None] * np.maximum(values, 0.0))
+    parts = np.einsum("pi,...pm->...mi", modes, K)
+    V = np.square(parts) @ np.square(1 - factor).T / (count - factor.sum(axis=1)) ** 2
     V_min = V.min(axis=-1, keepdims=True)
     share = np.where(V_min > 0, (V_min / np.where(V > 0, V, 1.0)) ** count, V == 0)
-    return np.asarray(
-        np.einsum("...mw,w...im->...im", share / share.sum(axis=-1, keepdims=True), curves)
-    )
+    mean_factor = (share / share.sum(axis=-1, keepdims=True)) @ factor
+    return np.asarray(np.einsum("pi,...mi->...pm", modes, mean_factor * parts))
 
 
 def _K_of_integrals(
