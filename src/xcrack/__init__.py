@@ -22,6 +22,7 @@ _HOME = {
     "part": "mesh.parts",
     "notched_cylinder": "mesh.cylinder",
     "refine": "mesh.refinement",
+    "fit_curves": "mesh.fitted_curves",
     "Isotropic": "model.material",
     "Graded": "model.material",
     "MaterialSets": "model.material",

@@ -213,8 +213,8 @@ write_mesh
 KEYS = """
 grow Cycle Spectrum read_spectrum twist wheeler willenborg plastic_zone pardiso max_hoop_stress
 mean_reference weighted_angle life lognormal normal inspection logistic_pod residual_strength
-assessment_line handbook Numerics adapt read_deck refine part read_field law material time_rate
-nasgro_K_c mesh_step read_mesh read_surface
+assessment_line handbook Numerics adapt read_deck fit_curves refine part read_field law material
+time_rate nasgro_K_c mesh_step read_mesh read_surface
 K_gradient K_over_size load_over_cycles load_over_size retarded
 """.split()  # functions that a section or key stands for
 MAKERS = {"line_crack", "penny_crack", "elliptic_crack", "plane_crack", "surface_crack"}
@@ -339,6 +339,37 @@ plane = "strain"
     middle = mesh.points[mesh.cells].mean(axis=1)[:, 0]
     assert len(problem.mesh.cell_sets["steel"]) == (middle < 10).sum()
     assert problem.material["soft"].E == 70e3
+
+
+def test_bodies_from_files_get_their_curves(tmp_path):
+    """The square's corners of 90 degrees stay, an octagon's of 45 become round."""
+    angle = np.pi / 4 * np.arange(8)
+    points = np.concatenate([10 * np.stack([np.cos(angle), np.sin(angle)], axis=1), [[0, 0]]])
+    k = np.arange(8)
+    cells = np.stack([k, (k + 1) % 8, np.full(8, 8)], axis=1)
+    rim = {"rim": cells[:, :2]}
+    xc.write_mesh(tmp_path / "disc.msh", xc.Mesh(points, cells, rim))
+    text = """[mesh]
+kind = "file"
+path = "disc.msh"
+fit_curves = { where = ["rim"], angle = 48 }
+refine = { size = 1 }
+[material]
+E = 1000
+nu = 0.3
+plane = "strain"
+[[cracks]]
+kind = "line"
+points = [[-2, 0], [2, 0]]
+[[loads]]
+kind = "pressure"
+where = "rim"
+p = -1
+"""
+    with pytest.warns(xc.XcrackWarning, match="like chords"):
+        mesh = read(tmp_path, text).problem.mesh
+    x = mesh.points[np.unique(mesh.facet_sets["rim"])]
+    assert np.linalg.norm(x, axis=1) == pytest.approx(10, rel=2e-6)
 
 
 def test_handbook_and_specimen(tmp_path):

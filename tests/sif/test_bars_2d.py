@@ -1,6 +1,7 @@
 """Error bars of K in 2D: against exact fields and finer meshes, and where there are none."""
 
 import pickle
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -211,10 +212,30 @@ def test_hole_whose_curve_is_known():
     coarse, wanted = K[0.14], K[0.03].best
     assert np.abs(coarse.best - wanted).max() < 0.2 * np.abs(coarse.K - wanted).max()
     assert holds(coarse, wanted)
-    unknown = xc.Mesh(mesh.points, mesh.cells, mesh.facet_sets)
-    sif = with_error(xc.Problem(unknown, UNIT, [crack], loads=PULLED))
-    assert np.isnan(sif.bar).all()
-    assert "chords of curves" in sif.reasons[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [0.28, 0.14])
+def test_hole_whose_curve_is_not_known(size):
+    """Bars are those of the polygon, and what the curve changes is said: to a third of it."""
+    K, messages = [], []
+    crack = xc.line_crack([(0.2, 0.01), (0.6, 0.01)])
+    round_mesh = xc.plate_with_hole(width=2, height=2, radius=0.25, size=size, size_near=size / 2)
+    polygon = xc.Mesh(round_mesh.points, round_mesh.cells, round_mesh.facet_sets)
+    for mesh in (round_mesh, polygon, xc.fit_curves(polygon)):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            result = xc.adapt(xc.Problem(mesh, UNIT, [crack], loads=PULLED), 2e-3, progress=False)
+        assert result.met, result.reason
+        K.append(result.sif.best[0])
+        messages.append([str(m.message) for m in caught if "chords of curves" in str(m.message)])
+    assert [len(m) for m in messages] == [0, 1, 0]
+    share = np.abs(K[1] - K[0]).max() / np.abs(K[0]).max()
+    told = float(messages[1][0].split("about ")[1].split()[0])
+    print(f"\nK changes by {share:.4f}, {told:.4f} is told")
+    assert share > 2e-3
+    assert told == pytest.approx(share, rel=1 / 3)
+    assert K[2] == pytest.approx(K[0], abs=2 * 2e-3 * np.abs(K[0]).max())
 
 
 def edge(n=10, **options):

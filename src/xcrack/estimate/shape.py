@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from xcrack.analysis.solution import Solution, fields_at, gradients_at
 from xcrack.base.arrays import Bools, Floats, Ints
@@ -20,8 +22,9 @@ from xcrack.fem.loads import facet_points, position
 from xcrack.fem.quadrature import Points, lip_side
 from xcrack.mesh.mesh import Mesh
 
-_ROUND = 0.9  # rad; facets that turn by more meet at a corner
-_ALIKE = 3.0  # ratio of the turns at both ends of a facet of a curve
+_ROUND = 1.1  # rad; facets that turn by more meet at a corner
+_ALIKE = 6.0  # ratio of the turns at both ends of a chord of a curve, and of lengths of chords
+_STRAIGHT = 1e-6  # rad; facets that turn by less lie in one line
 # Share of each absolute contribution of a crack's shape that is in doubt: where it is smooth, of
 # each point of open faces, and a larger one of what a stretch of some cells contributes where they
 # press, over which the tilt is there and back; and besides at kinks, of each point, all of it from
@@ -283,17 +286,21 @@ def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]
         x = position(solutions[0].space, points.cell, points.bary)
         offset = np.einsum("qd,qd->q", np.asarray(curve(x)) - x, normal)
         shape_terms -= _boundary_changes(solutions, z, points, offset)
-    facets, sagitta = _chords(mesh)
-    if len(facets) and sides:
+    chords = _chords(mesh)
+    is_curved = chords.turn != 0
+    if sides:
         curved_numbers = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
-        has_no_curve = ~np.isin(mesh.facet_numbers(facets), curved_numbers)
-        facets, sagitta = facets[has_no_curve], sagitta[has_no_curve]
-    if not len(facets):
+        is_curved &= ~np.isin(mesh.facet_numbers(chords.facets), curved_numbers)
+    if not is_curved.any():
         return shape_terms, np.zeros_like(shape_terms)
-    points, _ = facet_points(solutions[0].space, facets, 3)
-    of_cell = np.zeros(len(mesh.cells))
-    of_cell[mesh.facet_to_cell[mesh.facet_numbers(facets), 0]] = sagitta
-    return shape_terms, -_boundary_changes(solutions, z, points, of_cell[points.cell])
+    points, _ = facet_points(solutions[0].space, chords.facets[is_curved], 3)
+    row_of_cell = np.zeros(len(mesh.cells), dtype=np.int64)
+    row_of_cell[mesh.facet_to_cell[mesh.facet_numbers(chords.facets[is_curved]), 0]] = (
+        is_curved.nonzero()[0]
+    )
+    x = position(solutions[0].space, points.cell, points.bary)
+    offset = chords.heights(x, row_of_cell[points.cell])
+    return shape_terms, -_boundary_changes(solutions, z, points, offset)
 
 
 def _boundary_changes(
@@ -357,8 +364,35 @@ def _products(
     return result
 
 
-def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
-    """Boundary facets that look like chords of a curve, and how far it lies outward in the mean."""
+@dataclass(frozen=True, eq=False)
+class _Chords:
+    """Straight legs of the boundary of a mesh in 2D, the body on their left.
+
+    Attributes
+    ----------
+    facets : (k, 2) array of int
+    begin, direction : (k, 2) arrays
+        Where the leg of each facet begins, and its unit direction.
+    length : (k,) array, length
+        Of the leg: facets that lie in one line are one leg.
+    turn : (k,) array, rad
+        Of the boundary from leg to leg, where they look like chords of a curve; elsewhere 0.
+    """
+
+    facets: Ints
+    begin: Floats
+    direction: Floats
+    length: Floats
+    turn: Floats
+
+    def heights(self, x: Floats, row: Ints) -> Floats:
+        """How far arcs lie outward of points `(q, 2)` on the facets of some rows `(q,)`."""
+        way = np.einsum("qd,qd->q", x - self.begin[row], self.direction[row])
+        return np.asarray(self.turn[row] / 2 * way * (1 - way / self.length[row]))
+
+
+def _chords(mesh: Mesh) -> _Chords:
+    """The legs of the boundary, and which of them look like chords of a curve."""
     facets = mesh.boundary
     cell = mesh.facet_to_cell[mesh.facet_to_cell[:, 1] < 0, 0]
     x = mesh.points[facets]
@@ -367,27 +401,29 @@ def _chords(mesh: Mesh) -> tuple[Ints, Floats]:
     is_backward = chord[:, 0] * outward_direction[:, 1] - chord[:, 1] * outward_direction[:, 0] > 0
     ends = np.where(is_backward[:, None], facets[:, ::-1], facets)  # the body on the left
     chord = np.where(is_backward[:, None], -chord, chord)
-    facet_to_begin, facet_from_end = np.full((2, mesh.n_points), -1)
-    facet_to_begin[ends[:, 1]], facet_from_end[ends[:, 0]] = (
-        np.arange(len(ends)),
-        np.arange(len(ends)),
-    )
     heading = np.arctan2(chord[:, 1], chord[:, 0])
-    previous_facet, next_facet = facet_to_begin[ends[:, 0]], facet_from_end[ends[:, 1]]
-
-    def turn(from_facet: Ints, to_facet: Ints) -> Floats:
-        difference = heading[to_facet] - heading[from_facet]
-        return np.asarray((difference + np.pi) % (2 * np.pi) - np.pi)
-
-    facet_numbers = np.arange(len(ends))
-    t0, t1 = turn(previous_facet, facet_numbers), turn(facet_numbers, next_facet)
-    smaller_turn, larger_turn = (
-        np.minimum(np.abs(t0), np.abs(t1)),
-        np.maximum(np.abs(t0), np.abs(t1)),
-    )
-    is_curved = (previous_facet >= 0) & (next_facet >= 0) & (t0 * t1 > 0) & (smaller_turn > 1e-6)
-    is_curved &= (larger_turn < _ROUND) & (larger_turn < _ALIKE * smaller_turn)
-    length = np.linalg.norm(chord, axis=1)
-    # An arc that turns by t over a chord of length L lies L t / 12 outside of it in the mean.
-    sagitta = (t0 + t1) / 2 * length / 12
-    return ends[is_curved], sagitta[is_curved]
+    facet_from_point = np.full(mesh.n_points, -1)
+    facet_from_point[ends[:, 0]] = np.arange(len(ends))
+    next_facet = facet_from_point[ends[:, 1]]
+    turn_to_next = (heading[next_facet] - heading + np.pi) % (2 * np.pi) - np.pi
+    is_straight = (next_facet >= 0) & (np.abs(turn_to_next) < _STRAIGHT)
+    links = (np.ones(int(is_straight.sum())), (is_straight.nonzero()[0], next_facet[is_straight]))
+    n_legs, leg = connected_components(coo_array(links, shape=(len(ends),) * 2), directed=False)
+    length = np.bincount(leg, np.linalg.norm(chord, axis=1), n_legs)
+    end_facet = np.full(n_legs, -1)
+    end_facet[leg[~is_straight]] = (~is_straight).nonzero()[0]
+    next_leg = leg[next_facet[end_facet]]
+    begin_facet = np.full(n_legs, -1)
+    begin_facet[next_leg] = next_facet[end_facet]
+    turn = turn_to_next[end_facet]
+    leg_before = np.arange(n_legs)
+    leg_before[next_leg] = np.arange(n_legs)
+    turn_at_begin, turn_at_end = turn[leg_before], turn
+    smaller_turn = np.minimum(np.abs(turn_at_begin), np.abs(turn_at_end))
+    larger_turn = np.maximum(np.abs(turn_at_begin), np.abs(turn_at_end))
+    neighbours = np.stack([length[leg_before], length[next_leg]])
+    is_curved = (turn_at_begin * turn_at_end > 0) & (larger_turn < _ROUND)
+    is_curved &= (larger_turn < _ALIKE * smaller_turn) & (length < _ALIKE * neighbours).all(axis=0)
+    turn = np.where(is_curved, (turn_at_begin + turn_at_end) / 2, 0.0)
+    direction = chord / np.linalg.norm(chord, axis=1)[:, None]
+    return _Chords(ends, mesh.points[ends[begin_facet, 0]][leg], direction, length[leg], turn[leg])

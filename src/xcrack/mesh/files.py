@@ -24,6 +24,7 @@ from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.ansys import read_ansys
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.curves import Curve, check_on_curves
+from xcrack.mesh.fitted_curves import warn_of_chords
 from xcrack.mesh.keywords import KeywordUse, missed_words
 from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
 from xcrack.mesh.mesh import Mesh, sound_mesh
@@ -123,7 +124,9 @@ def read_mesh(path: FileName, *, strict: Switch = False) -> Mesh:
         parts.append(message)
     if parts:
         warn(f"{path.name}: {'; '.join(parts)}.")
-    return with_stored_curves(mesh, path)
+    mesh = with_stored_curves(mesh, path)
+    warn_of_chords(mesh, path.name)
+    return mesh
 
 
 def raw_mesh_of(path: Path) -> tuple[RawMesh, list[KeywordUse]]:

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from xcrack.analysis.solution import Solution
 from xcrack.analysis.solve import solve_states
 from xcrack.base.arrays import Bools, Floats, at
-from xcrack.base.errors import GeometryError, ProblemError
+from xcrack.base.errors import GeometryError, ProblemError, warn
 from xcrack.base.machine import threads
 from xcrack.crack.crack import kink_numbers
 from xcrack.estimate.estimate import Estimate, estimate
@@ -243,7 +243,8 @@ _SPREAD_ROOM = 2.0
 # along a crack, whose K is zero (1e-6 at worst on three adapted meshes).
 _QUADRATURE = 3e-6
 _AT_CORNERS = 0.2  # of what the cells at re-entrant corners contribute
-_RIM, _CHORDS, _END = 0.03, 1.0, 0.55  # of changes of shape, and of the contact's end
+_RIM, _END = 0.03, 0.55  # of changes of shape, and of the contact's end
+_POLYGON = 1e-3  # share of K below which nothing is said of chords
 _BEND = 1.5  # of the bar of a change of shape
 _LOAD = 0.25  # of what given pressures miss between points: left by four times as many at a jump
 # Cells, by their longest edges: the shortest crack between two tips and from a mouth to a tip, and
@@ -315,6 +316,7 @@ def bars_and_shares(
         _bars(sif, errors, k, domains, s, crack)
         for k, (sif, s) in enumerate(zip(sifs, solutions, strict=True))
     ]
+    _warn_of_polygon(errors.chords, bars, sifs, crack)
     return bars, errors.shares + errors.gap_shares
 
 
@@ -387,14 +389,10 @@ def _bars(
         contact = contact + _OVERLAP * overlap.max()
         contact[:, 0] += np.maximum(overlap - bar[:, 0], 0.0)
         bar[:, 0] = np.maximum(bar[:, 0], overlap)
-    reasons = [
-        place or _refusal_of_polygon(errors.chords[k][i], bar[i]) for i, place in enumerate(places)
-    ]
-    bar += _CHORDS * np.abs(errors.chords[k])
     # K_I of closed tips is zero; its bar is what the integral gave.
     eta[sif.closed, 0] = 0.0
     bar[sif.closed, 0] = contact[sif.closed, 0] = np.abs(sif.K_integral[sif.closed, 0])
-    return bars_of(eta, bar, reasons, contact)
+    return bars_of(eta, bar, places, contact)
 
 
 def _are_on_points(solution: Solution, crack: int) -> Bools:
@@ -535,14 +533,20 @@ def _room(mesh: Mesh, x: Floats) -> float:
     return float(distance_to_simplices(x, mesh.points[mesh.boundary]).min())
 
 
-def _refusal_of_polygon(change: Floats, bar: Floats) -> str:
-    """Why a polygon instead of a curve leaves no estimate, or nothing."""
-    if np.abs(change).max() <= bar.max():
-        return ""
-    return (
-        "parts of the boundary look like chords of curves, which would change K by "
-        f"{np.abs(change).max():.2g}: give the mesh its curves, or refine it there"
-    )
+def _warn_of_polygon(change: Floats, bars: Sequence[KErrors], sifs: Sequence[SIF], c: int) -> None:
+    """Say what K changes if a polygon stands for a curve, where that is more than its bars."""
+    ratios = [
+        float(np.abs(changes).max() / np.abs(sif.K).max())
+        for changes, errors, sif in zip(change, bars, sifs, strict=True)
+        if (np.abs(changes) > errors.bar).any() and sif.K.any()
+    ]
+    if ratios and max(ratios) > _POLYGON:
+        warn(
+            f"K of crack {c} is that of the polygon that the mesh is. Parts of its boundary look "
+            f"like chords of curves; if they are, K changes by about {max(ratios):.1g} of the "
+            "largest, which bars leave out. xc.fit_curves(mesh) gives the mesh the curves through "
+            "its points, as cells of second order do."
+        )
 
 
 # Bars of K along fronts in 3D: order 2 beside order 1, two domains and wider hats at order 2.

@@ -1,0 +1,264 @@
+"""Curved sides through the points of a mesh of straight cells.
+
+Files of linear cells have lost their curves; the points are still on them. Around each point of a
+smooth side a paraboloid is laid through its neighbours: where all of these are on a circle (2D), a
+sphere or a cylinder seen along it, the curvature 2 d·n / d² of the circle through both points with
+the normal n is exact at any distance d.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Annotated, Any
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from xcrack.base.arguments import CheckedBy, Error, Number, Part, check_arguments
+from xcrack.base.arrays import Floats, Ints, at
+from xcrack.base.checks import entries
+from xcrack.base.errors import MeshError, warn
+from xcrack.mesh.curved_facets import raised_lattice, with_curves
+from xcrack.mesh.mesh import Mesh, facet_set, numbers_of
+from xcrack.mesh.simplex import outward_areas
+
+_ANGLE = 50.0  # degrees: facets that turn by more meet at a corner
+_COARSE = 20.0  # degrees from which a mesh that is read says that it looks like chords
+_PASSES = 4  # in which normals come to rest
+_ALIKE = 1.5  # ratio of the curvatures at the ends of an edge up to which their mean is taken
+_PARALLEL = 0.9  # cosine of the angle from which two sides are one at their edge
+_NEARNESS = 6  # power of the distance with which neighbours count less: arcs end beside them
+_LEAST = 1e-9  # of the size of a fit: what neighbours do not decide is left out
+
+
+def _set_names(value: Any, label: str, error: Error) -> tuple[str, ...]:
+    """Names of one facet set or several."""
+    return (value,) if isinstance(value, str) else entries(value, label, error=error)
+
+
+@check_arguments(MeshError)
+def fit_curves(
+    mesh: Annotated[Mesh, Part(Mesh)],
+    where: Annotated[str | Sequence[str] | None, CheckedBy(_set_names)] = None,
+    *,
+    angle: Annotated[float, Number(above=0.0, below=90.0)] = _ANGLE,
+) -> Mesh:
+    """A mesh with the smooth curves or surfaces that its points lie on.
+
+    For meshes of linear cells, whose holes and fillets are polygons: with curves `refine`, `adapt`
+    and runs with a tolerance make them round, and bars of K know what the chords change. Circles
+    are exact; other curves are far nearer than their chords. Straight sides stay as they are.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    where : str or sequence of str, optional
+        Facet sets to look at; the whole boundary if omitted.
+    angle : float, degrees
+        Facets that turn by more from one to the next meet at a corner.
+
+    Returns
+    -------
+    Mesh
+        A set that is one smooth curved side has its curve; other curved sides are in sets
+        ``curved_1``, ``curved_2`` ...
+
+    Raises
+    ------
+    MeshError
+        No such set.
+    """
+    names = ("boundary",) if where is None else where
+    facets = np.concatenate([facet_set(mesh, name, "fit_curves") for name in names])
+    facets = np.unique(np.sort(facets, axis=1), axis=0)
+    pairs, offset = _arcs(mesh, facets, angle)
+    middles = mesh.points[pairs].mean(axis=1) + offset
+    return with_curves(mesh, facets, raised_lattice(mesh, facets, pairs, middles))
+
+
+def warn_of_chords(mesh: Mesh, source: str) -> None:
+    """Say where facets look like coarse chords of a curve that a mesh does not know.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    source : str
+        Name of the file, for the message.
+    """
+    curved_numbers = [numbers_of(mesh, mesh.facet_sets[name]) for name in mesh.curves]
+    facets = mesh.boundary
+    if curved_numbers:
+        facets = facets[~np.isin(numbers_of(mesh, facets), np.concatenate(curved_numbers))]
+    if not len(facets):
+        return
+    pairs, offset = _arcs(mesh, facets, _ANGLE)
+    length = np.linalg.norm(mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]], axis=1)
+    turn = 8 * np.linalg.norm(offset, axis=1) / length
+    k = int(np.argmax(turn))
+    if turn[k] > np.radians(_COARSE):
+        warn(
+            f"{source}: facets near {at(mesh.points[pairs[k, 0]])} turn by about "
+            f"{np.degrees(turn[k]):.0f} degrees from one to the next, like chords of a curve that "
+            f"straight cells have lost: K at a crack there is then about {turn[k] ** 2 / 12:.1%} "
+            "off. xc.fit_curves(mesh) takes the curves through the points, cells of second order "
+            "hold them."
+        )
+
+
+def _arcs(mesh: Mesh, facets: Ints, angle: float) -> tuple[Ints, Floats]:
+    """Edges of facets `(e, 2)`, and how far the curve through the points is off their middles."""
+    normal = outward_areas(mesh, facets, "fit_curves")
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    side = _sides(facets, normal, _labels(mesh, facets), float(np.cos(np.radians(angle))))
+    # A point of two sides has a normal of each.
+    key, node = np.unique(
+        np.stack([np.repeat(side, mesh.dim), facets.ravel()], axis=1), axis=0, return_inverse=True
+    )
+    corner = node.reshape(facets.shape)
+    edges = _edges(corner)
+    x = mesh.points[key[:, 1]]
+    normals = _normals(x, _ring(edges, len(x)), _mean_normals(corner, normal, len(x)))
+    return _at_shared_edges(key[edges, 1], *_heights(x, normals, edges))
+
+
+def _edges(corner: Ints) -> Ints:
+    """Pairs of points of facets that have an edge in common `(e, 2)`, smaller first."""
+    pairs = [corner[:, list(pair)] for pair in combinations(range(corner.shape[1]), 2)]
+    return np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
+
+
+def _labels(mesh: Mesh, facets: Ints) -> Ints:
+    """A number for each facet `(k,)`, the same where they are in the same sets."""
+    number = numbers_of(mesh, facets)
+    members = [np.isin(number, numbers_of(mesh, f)) for f in mesh.facet_sets.values()]
+    return np.unique(np.array(members), axis=1, return_inverse=True)[1].ravel()
+
+
+def _sides(facets: Ints, normal: Floats, label: Ints, least_cosine: float) -> Ints:
+    """Number of the smooth side of each facet `(k,)`: no turn from one to the next is sharp.
+
+    Where sets divide the boundary a curve may end, as where a straight side goes on.
+    """
+    count, d = facets.shape
+    joints = np.concatenate([facets[:, list(c)] for c in combinations(range(d), d - 1)])
+    owner = np.tile(np.arange(count), d)
+    _, group, members = np.unique(
+        np.sort(joints, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    order = np.argsort(group.ravel(), kind="stable")
+    first = np.concatenate([[0], np.cumsum(members)])[:-1][members == 2]
+    a, b = owner[order[first]], owner[order[first + 1]]
+    is_smooth = (label[a] == label[b]) & (
+        np.einsum("jd,jd->j", normal[a], normal[b]) > least_cosine
+    )
+    links = (np.ones(int(is_smooth.sum())), (a[is_smooth], b[is_smooth]))
+    graph = coo_array(links, shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _ring(edges: Ints, count: int) -> tuple[Ints, Ints]:
+    """Points `(r,)` and their neighbours, next ones and those behind them."""
+    ones = np.ones(2 * len(edges))
+    pairs = (np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]]))
+    next_to = csr_array((ones, pairs), shape=(count, count))
+    row, neighbour = (next_to + next_to @ next_to).nonzero()
+    is_other = row != neighbour
+    return row[is_other], neighbour[is_other]
+
+
+def _mean_normals(corner: Ints, normal: Floats, count: int) -> Floats:
+    """Unit means of the normals of the facets around each point."""
+    mean = np.zeros((count, normal.shape[1]))
+    for column in corner.T:
+        np.add.at(mean, column, normal)
+    return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True))
+
+
+def _normals(x: Floats, ring: tuple[Ints, Ints], normal: Floats) -> Floats:
+    """Unit normals for which the curvatures towards the neighbours are those of a paraboloid.
+
+    2 d·n / d² = κ(t) + 2 g·d / d² of a tangent direction t, with a form κ and the tilt g of n.
+    """
+    row, neighbour = ring
+    d = x[neighbour] - x[row]
+    length = np.linalg.norm(d, axis=1)
+    first = np.searchsorted(row, np.arange(len(x)))
+    scale = np.add.reduceat(length, first) / np.bincount(row)
+    for _ in range(_PASSES):
+        tangents = _tangents(normal)
+        flat = np.einsum("qkd,qd->qk", tangents[row], d)
+        direction = flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
+        squares = [
+            direction[:, i] * direction[:, j] * (length / scale[row])
+            for i in range(flat.shape[1])
+            for j in range(i + 1)
+        ]
+        table = np.stack([*squares, *(2 * flat / length[:, None]).T], axis=1)
+        weight = (scale[row] / length) ** _NEARNESS
+        value = 2 * np.einsum("qd,qd->q", d, normal[row]) / length
+        rows = weight[:, None] * table
+        matrix = np.add.reduceat(rows[:, :, None] * table[:, None], first)
+        vector = np.add.reduceat(rows * value[:, None], first)
+        size = np.trace(matrix, axis1=1, axis2=2)[:, None, None]
+        fit = np.linalg.solve(matrix + _LEAST * size * np.eye(table.shape[1]), vector[..., None])
+        tilt = fit[:, len(squares) :, 0]
+        normal = normal - np.einsum("pk,pkd->pd", tilt, tangents)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return normal
+
+
+def _tangents(normal: Floats) -> Floats:
+    """Unit vectors across normals `(n, d - 1, d)`."""
+    if normal.shape[1] == 2:
+        return np.stack([normal[:, ::-1] * (-1, 1)], axis=1)
+    axis = np.eye(3)[np.abs(normal).argmin(axis=1)]
+    first = np.cross(normal, axis)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def _heights(x: Floats, normal: Floats, edges: Ints) -> tuple[Floats, Floats]:
+    """Heights of the arcs over edges `(e,)`, and the unit normals there `(e, d)`."""
+    a, b = edges.T
+    d = x[b] - x[a]
+    square = np.einsum("ed,ed->e", d, d)
+    at_a = 2 * np.einsum("ed,ed->e", d, normal[a]) / square
+    at_b = -2 * np.einsum("ed,ed->e", d, normal[b]) / square
+    half = np.sqrt(square) / 2
+    bend = _curvature_between(at_a, at_b) * half
+    height = -half * bend / (1 + np.sqrt(np.maximum(1 - bend * bend, 0.0)))
+    up = normal[a] + normal[b]
+    up -= (np.einsum("ed,ed->e", up, d) / square)[:, None] * d
+    up /= np.maximum(np.linalg.norm(up, axis=1), 1e-300)[:, None]
+    return np.where(np.abs(bend) < 1, height, 0.0), up
+
+
+def _at_shared_edges(pairs: Ints, height: Floats, up: Floats) -> tuple[Ints, Floats]:
+    """Edges, each once, and what their middles are off the chord `(e, d)`.
+
+    Where two sides meet, the edge has the height of each along its normal.
+    """
+    pairs, row, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(row.ravel(), kind="stable")
+    first = order[np.concatenate([[0], np.cumsum(count)[:-1]])]
+    offset = height[first, None] * up[first]
+    is_shared = count == 2
+    a, b = first[is_shared], order[np.cumsum(count)[is_shared] - 1]
+    cosine = np.einsum("ed,ed->e", up[a], up[b])
+    is_one = np.abs(cosine) > _PARALLEL
+    sine_square = np.where(is_one, 1.0, 1 - cosine * cosine)[:, None]
+    of_a, of_b = height[a] - cosine * height[b], height[b] - cosine * height[a]
+    crossing = (of_a[:, None] * up[a] + of_b[:, None] * up[b]) / sine_square
+    mean = (height[a, None] * up[a] + height[b, None] * up[b]) / 2
+    offset[is_shared] = np.where(is_one[:, None], mean, crossing)
+    return pairs, offset
+
+
+def _curvature_between(a: Floats, b: Floats) -> Floats:
+    """The mean where both ends agree, else the smaller one: straight sides end arcs smoothly."""
+    smaller = np.where(np.abs(a) < np.abs(b), a, b)
+    is_alike = np.maximum(np.abs(a), np.abs(b)) < _ALIKE * np.abs(smaller)
+    return np.where(a * b <= 0, 0.0, np.where(is_alike, (a + b) / 2, smaller))
+
+
+__all__ = ["fit_curves", "warn_of_chords"]
