@@ -11,8 +11,8 @@ import xcrack
 NAMES = [
     # scene
     "Crack", "Graded", "Isotropic", "MaterialSets", "Mesh", "Numerics", "Problem",
-    "body_force", "box", "crack_pressure", "displacement", "fit_curves", "fix", "initial_stress", "line_crack",
-    "line_force",
+    "body_force", "box", "crack_pressure", "displacement", "fix", "initial_stress",
+    "line_crack", "line_force", "fit_curves",
     "penny_crack", "elliptic_crack", "plane_crack", "surface_crack", "read_surface", "arm",
     "notched_cylinder", "part", "plate", "plate_with_hole", "point_force", "pressure", "read_mesh",
     "mesh_step", "read_field", "read_deck", "Deck", "bearing", "resultant", "temperature",
