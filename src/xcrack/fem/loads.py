@@ -135,31 +135,25 @@ def _add_densities(
             add_forces(f, number, batch.functions, row, N, points.weight, values)
 
 
-def _add_point_forces(f: Floats, space: FunctionSpace, number: Ints, force: Floats) -> None:
-    """Add forces at mesh points and in the middles of edges, numbered after all points."""
+def _add_point_forces(
+    f: Floats, space: FunctionSpace, cell: Ints, bary: Floats, force: Floats
+) -> None:
+    """Add forces at places in cells; those at mesh points act on standard functions alone."""
     mesh = space.mesh
-    is_middle = number >= mesh.n_points
-    np.add.at(f, number[~is_middle], force[~is_middle])
-    if not is_middle.any():
+    is_point = bary.max(axis=1) == 1
+    corner = bary[is_point].argmax(axis=1)
+    np.add.at(f, mesh.cells[cell[is_point], corner], force[is_point])
+    if is_point.all():
         return
-    edge, row = np.unique(number[is_middle] - mesh.n_points, return_inverse=True)
-    total = np.zeros((len(edge), space.dim))
-    np.add.at(total, row, force[is_middle])
-    place = np.full(len(mesh.edges), -1)
-    place[edge] = np.arange(len(edge))
-    owner, _ = np.nonzero(place[mesh.cell_to_edge] >= 0)
-    cell = np.full(len(edge), -1)
-    for column in place[mesh.cell_to_edge[owner]].T:
-        cell[column[column >= 0]] = owner[column >= 0]
-    is_end = (mesh.cells[cell][:, :, None] == mesh.edges[edge][:, None, :]).any(axis=2)
+    rows = (~is_point).nonzero()[0]
+    rows = rows[np.argsort(cell[rows], kind="stable")]
+    cell, bary = cell[rows], bary[rows]
     side = cell_side(space, cell)
     for c, cut in enumerate(space.cuts):
-        phi = cut.level_set.phi[mesh.edges[edge]].mean(axis=1)
+        phi = np.einsum("qv,qv->q", bary, cut.level_set.phi[mesh.cells[cell]])
         is_crossed = cut.is_cut[cell] | (cut.is_tip[cell] & (side[:, c] == 0))
         side[is_crossed, c] = np.where(phi[is_crossed] >= 0, 1, -1)
-    order = np.argsort(cell, kind="stable")
-    points = Points(cell[order], 0.5 * is_end[order], np.ones(len(edge)), side[order])
-    _add(f, space, points, total[order])
+    _add(f, space, Points(cell, bary, np.ones(len(cell)), side), force[rows])
 
 
 def _scatter(f: Floats, functions: Ints, force: Floats) -> None:

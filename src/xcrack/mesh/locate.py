@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from xcrack.base.arrays import Bools, Floats, Ints, lock
-from xcrack.mesh.distances import TriangleTree, signed_in
-from xcrack.mesh.mesh import Mesh
+from xcrack.mesh.distances import TriangleTree, closest_in, closest_on_segment, signed_in
+from xcrack.mesh.mesh import Mesh, nearest_nodes
 
 _CROSSINGS = 1_000_000  # pairs of a piece and a boundary facet that are looked at at once
 _WHOLE = lock(np.array([0.0, 1.0]))
+_AT_NODE = 1e-6  # of a cell: a point this close to a node is there
 _TOLERANCE = 1e-10  # barycentric; a point this close to a cell belongs to it (round-off)
 
 
@@ -41,6 +42,55 @@ def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
 def contains(mesh: Mesh, x: Floats) -> Bools:
     """Which points lie in the body."""
     return locate(mesh, x)[0] >= 0
+
+
+def places_in_body(mesh: Mesh, x: Floats, label: str) -> tuple[Ints, Floats]:
+    """A cell of each point `(k,)`, and barycentric coordinates of the place nearest to it there.
+
+    Points next to a mesh point or the middle of an edge are there exactly; those beside the body
+    are taken to the nearest place of its boundary.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    x : (k, d) array, length
+    label : str
+        For messages.
+
+    Raises
+    ------
+    ProblemError
+        Other numbers of coordinates; a point that is more than a cell away from the body.
+    """
+    nodes = nearest_nodes(mesh, x, label)
+    cell, bary = (np.array(values) for values in locate(mesh, x))
+    rows = np.nonzero(cell < 0)[0]
+    if len(rows):
+        cell[rows], feet = nearest_on_boundary(mesh, x[rows])
+        bary[rows] = np.maximum(barycentric(mesh, cell[rows], feet), 0.0)
+        bary /= bary.sum(axis=1, keepdims=True)
+    ends = np.concatenate([np.repeat(np.arange(mesh.n_points)[:, None], 2, axis=1), mesh.edges])
+    ends_of_node = ends[nodes]
+    is_node = np.linalg.norm(mesh.points[ends_of_node].mean(axis=1) - x, axis=1) <= (
+        _AT_NODE * mesh.cell_size[cell]
+    )
+    for k in np.nonzero(is_node)[0]:
+        has_ends = (mesh.cells[:, :, None] == ends_of_node[k]).any(axis=1).all(axis=1)
+        cell[k] = int(np.argmax(has_ends))
+        bary[k] = (mesh.cells[cell[k]][:, None] == ends_of_node[k]).mean(axis=1)
+    return cell, bary
+
+
+def nearest_on_boundary(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
+    """Cells at the nearest places of the boundary `(k,)`, and these places `(k, d)`."""
+    outer_cells = mesh.facet_to_cell[mesh.facet_to_cell[:, 1] < 0, 0]
+    if mesh.dim == 3:
+        nearest_point = closest_in(mesh.boundary_tree[0], x)
+        return outer_cells[nearest_point.triangle], nearest_point.foot
+    a, b = mesh.points[mesh.boundary].transpose(1, 0, 2)
+    feet = closest_on_segment(x[:, None], a, b)
+    row = np.linalg.norm(feet - x[:, None], axis=2).argmin(axis=1)
+    return outer_cells[row], feet[np.arange(len(x)), row]
 
 
 def cells_at(mesh: Mesh, x: Floats) -> Ints:

@@ -29,7 +29,8 @@ from xcrack.base.units import (
     TEMPERATURE,
 )
 from xcrack.mesh.holes import RoundHole, round_hole
-from xcrack.mesh.mesh import Mesh, facet_set, nearest_nodes, nearest_point
+from xcrack.mesh.locate import places_in_body
+from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.model.material import Material
 from xcrack.model.values import (
     Place,
@@ -247,11 +248,8 @@ class Load(Condition):
         """Pressure on the faces of a crack at points `(q,)`, None where it has none there."""
         raise NotImplementedError
 
-    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
-        """Mesh points `(m,)`, and the forces at them `(m, d)`.
-
-        The middle of edge e is point ``n_points + e``.
-        """
+    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats, Floats]:
+        """Cells `(m,)`, barycentric coordinates in them `(m, d + 1)`, and the forces `(m, d)`."""
         raise NotImplementedError
 
 
@@ -563,12 +561,14 @@ class resultant(Load):  # noqa: N801
 
 @dataclass(frozen=True, eq=False)
 class point_force(Load):  # noqa: N801
-    """Force at a point (the nearest mesh point takes it), or forces at several.
+    """Force at a point of the body, or forces at several.
+
+    Points beside the body, as where cells cut a curved side, are taken to its nearest place.
 
     Parameters
     ----------
     x : (d,) or (k, d) array, length
-        A point; or several, each of which may also be the middle of an edge.
+        A point, or several.
     f : (d,) or (k, d) array, force (per thickness in 2D)
         One force for all points, or one for each.
 
@@ -603,12 +603,10 @@ class point_force(Load):  # noqa: N801
             return f"point_force({len(self.x)} points)"  # type: ignore[arg-type]
         return f"point_force({np.round(np.asarray(self.x), 6).tolist()})"
 
-    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
-        """The nearest mesh points, and the forces."""
-        x = np.asarray(self.x)
-        if x.ndim == 1:
-            return np.array([nearest_point(mesh, x, self.kind)]), np.asarray(self.f)[None]
-        return nearest_nodes(mesh, x, self.kind), np.broadcast_to(np.asarray(self.f), x.shape)
+    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats, Floats]:
+        """The places, and the forces."""
+        x = np.atleast_2d(self.x)
+        return *places_in_body(mesh, x, self.kind), np.broadcast_to(np.asarray(self.f), x.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -662,8 +660,16 @@ class line_force(Load):  # noqa: N801
             )
         return edges
 
-    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
+    def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats, Floats]:
         """Forces at the points of the edge; the rule is exact up to cubic f N."""
+        number, force = self._nodal_forces(mesh)
+        cell_of_point = np.empty(mesh.n_points, dtype=np.int64)
+        cell_of_point[mesh.cells] = np.arange(len(mesh.cells))[:, None]
+        cell = cell_of_point[number]
+        return cell, (mesh.cells[cell] == number[:, None]).astype(float), force
+
+    def _nodal_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
+        """Mesh points, and the forces at them."""
         edges = self._edges(mesh)
         if mesh.dim == 2:
             number = edges[:, 0]

@@ -442,9 +442,9 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
     for load, factor in solution.acting:
         sign = np.sign(factor)
         if "point_force" in load.acts:
-            number, force = load.point_forces(mesh)
-            places = np.concatenate([mesh.points, mesh.edge_middles])
-            rows = [places[number], sign * force, np.zeros_like(force)]
+            cell, bary, force = load.point_forces(mesh)
+            x = np.einsum("kv,kvd->kd", bary, mesh.points[mesh.cells[cell]])
+            rows = [x, sign * force, np.zeros_like(force)]
             forces.append(np.stack(rows, axis=1))
         if "traction" not in load.acts:
             continue

@@ -128,9 +128,9 @@ def _leaves(mesh: Mesh, x: Floats, v: Floats) -> np.ndarray:
 def _arrows_of(load: Load, mesh: Mesh) -> Iterator[tuple[Floats, Floats]]:
     """Places and vectors of a load; of a small set one, its resultant."""
     if "point_force" in load.acts:
-        points = np.concatenate([mesh.points, mesh.edge_middles])
-        number, force = load.point_forces(mesh)
-        yield from ((points[i], f) for i, f in zip(number, force, strict=True))
+        cell, bary, force = load.point_forces(mesh)
+        x = np.einsum("kv,kvd->kd", bary, mesh.points[mesh.cells[cell]])
+        yield from zip(x, force, strict=True)
     if "traction" not in load.acts:
         return
     facets = mesh.facet_sets[load.where]
