@@ -125,15 +125,11 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
     face_times += [_met_face(rule, step, plan, *pair, body, m, True) for pair in pairs_beside]
     time, way, time_at_first_rate = first_meeting = min([*facing_times, *face_times])
     pairs_near = [*pairs_beside, *faces]  # fronts that only touch have no face ahead
-    # Last all fronts as far as those that meet: their gap is what it was along them.
-    shares: list[float | Floats] = [way]
+    share: float | Floats = way
     if first_meeting in facing_times:
-        shares.insert(0, _shares_of_stations(step, plan, facing_pairs, way, time, body))
-    for share in shares:
-        cracks_apart, part = _cracks_after(rule, step, plan, share), 1.0
-        joined_now = _joined_cracks(rule, cracks_apart, facing_pairs, pairs_near, body)
-        if joined_now.failure is None:
-            break
+        share = _shares_of_stations(step, plan, facing_pairs, way, time, body)
+    cracks_apart, part = _cracks_after(rule, step, plan, share), 1.0
+    joined_now = _joined_cracks(rule, cracks_apart, facing_pairs, pairs_near, body)
     for lesser_part in (
         _PARTS if joined_now.failed_pairs else ()
     ):  # fronts that overlap may join while they are apart
