@@ -1,5 +1,7 @@
 """Forces at points of the body that are no mesh points."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -88,3 +90,33 @@ def test_a_disc_that_two_forces_press(turn):
 def test_far_points_are_refused():
     with pytest.raises(xc.ProblemError, match="away from the nearest mesh point"):
         moved((3.0, 0.0), (1, 0), xc.box((0, 0), (1, 1), 5))
+
+
+def bent(n, at, f=(0.0, -1.0)):
+    """A bar of 8 x 1 on two rollers, pressed in its middle, with cells of 8 / n."""
+    bar = xc.box((-4, 0), (4, 1), (n, 6))
+    supports = [xc.fix((-at, 0.0)), xc.fix((at, 0.0), axis=1)]
+    crack = xc.line_crack([(0.0, -0.1), (0.0, 0.5)])
+    loads = [xc.point_force((0, 1), f)] if f else [xc.traction(s, lambda x, n: n) for s in
+                                                   ("left", "right")]  # fmt: skip
+    return xc.Problem(bar, STEEL[2], [crack], supports, loads)
+
+
+def warned(problem):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution = xc.solve(problem)
+    messages = [str(m.message) for m in caught if "mesh point" in str(m.message)]
+    return xc.stress_intensity(solution).K_I[0], messages
+
+
+def test_supports_that_hold_other_points_are_named():
+    """K of a bent bar follows its span; where nothing bears, nothing is said."""
+    exact, messages = warned(bent(41, 140 / 41))
+    assert not messages
+    K, messages = warned(bent(41, 3.5))
+    assert len(messages) == 2
+    assert "the distance of fix([-3.5, 0.0]) from the mesh point (-3.41463, 0)" in messages[0]
+    assert "is 0.01067, above 0.002" in messages[0]
+    assert K == pytest.approx(exact, rel=1e-9)  # the points that are nearest to both
+    assert not warned(bent(41, 3.5, None))[1]

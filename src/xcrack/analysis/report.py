@@ -11,9 +11,9 @@ from xcrack.base.arrays import Floats, Ints, at, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.curved_facets import outline_gain
-from xcrack.mesh.mesh import Mesh, facet_set
+from xcrack.mesh.mesh import Mesh, facet_set, nearest_nodes, nearest_point
 from xcrack.mesh.simplex import outward_areas
-from xcrack.model.loads import Load
+from xcrack.model.loads import Load, Support
 from xcrack.model.material import von_mises
 from xcrack.model.problem import Problem
 
@@ -115,6 +115,8 @@ def _friction_row(row: Ingredient, outcome: SolveOutcome) -> Ingredient:
 
 # Limits beyond which a number is more likely a slip than a state of a part.
 _OUTLINE = 0.01  # share of the area of a loaded side that its straight outline lacks
+_HELD_ELSEWHERE = 2e-3  # distance of a mesh point from where its support is, over the body's size
+_ROUND_OFF = 1e-6  # share of the largest force: a reaction below it is none
 _MOVED = 0.02  # displacement over the size of the body
 _STRAINED = 0.01  # stress over Young's modulus
 _SHARE = 0.95  # of the volume: beside corners and point forces stress has no limit
@@ -182,11 +184,12 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
         words = "give loads=[...], or a displacement that is not zero: K is zero everywhere."
         return [Alarm("the largest displacement", 0.0, 0.0, "in all load states", words)]
     loads = dict.fromkeys(load for s in solutions for load in s.loads)
-    outline_alarms = _outlines(problem.mesh, loads) if problem.mesh.curves else []
+    geometry_alarms = _outlines(problem.mesh, loads) if problem.mesh.curves else []
+    geometry_alarms += [alarm for s in problem.supports for alarm in _moved_points(solutions, s)]
     # What is imposed has no unit of a modulus.
     forces = any("support" not in load.acts for load in loads)
     if not has_units(problem) or not forces:
-        return outline_alarms
+        return geometry_alarms
     alarms = [_displacement(solution) for solution in solutions]
     if stresses:
         alarms += [_stress(solution) for solution in solutions]
@@ -195,7 +198,7 @@ def alarms_of_solutions(solutions: Sequence[Solution], *, stresses: bool = True)
         worst_alarm = worst_alarms.get(alarm.quantity)
         if alarm.value > alarm.limit and (worst_alarm is None or alarm.value > worst_alarm.value):
             worst_alarms[alarm.quantity] = alarm
-    return outline_alarms + list(worst_alarms.values())
+    return geometry_alarms + list(worst_alarms.values())
 
 
 def _outlines(mesh: Mesh, loads: Iterable[Load]) -> list[Alarm]:
@@ -219,6 +222,39 @@ def _outlines(mesh: Mesh, loads: Iterable[Load]) -> list[Alarm]:
             quantity = f"the share of the area of {load.where!r} {place}"
             alarms.append(Alarm(quantity, share, _OUTLINE, "", words))
     return alarms
+
+
+def _moved_points(solutions: Sequence[Solution], support: Support) -> list[Alarm]:
+    """A support at points that holds mesh points elsewhere, and with a force."""
+    mesh = solutions[0].space.mesh
+    if support.place is None or isinstance(support.place, str):
+        return []
+    x = np.atleast_2d(np.asarray(support.place))
+    if np.ndim(support.place) == 1:
+        nodes = mesh.points[[nearest_point(mesh, x[0], support.kind)]]
+    else:
+        all_nodes = np.concatenate([mesh.points, mesh.edge_middles])
+        nodes = all_nodes[nearest_nodes(mesh, x, support.kind)]
+    distance = np.linalg.norm(nodes - x, axis=1) / mesh.extent
+    k = int(np.argmax(distance))
+    if distance[k] <= _HELD_ELSEWHERE or not any(_bears(s, support) for s in solutions):
+        return []
+    remedy = (
+        "what bends between supports changes with their distance, and K with it. Give a mesh "
+        "point, refine the mesh there, or hold a facet set."
+    )
+    quantity = (
+        f"the distance of {support.name} from the mesh point {coordinates(nodes[k])} that it "
+        "holds, over the size of the body,"
+    )
+    return [Alarm(quantity, float(distance[k]), _HELD_ELSEWHERE, "", remedy)]
+
+
+def _bears(solution: Solution, support: Support) -> bool:
+    """Whether the reaction of a support is more than round-off leaves."""
+    rows = solution.summary.resultants
+    size = {row.name: float(np.linalg.norm(row.force)) for row in rows}
+    return size[f"reaction of {support.name}"] > _ROUND_OFF * max(size.values())
 
 
 def _displacement(solution: Solution) -> Alarm:

@@ -63,12 +63,12 @@ def places_in_body(mesh: Mesh, x: Floats, label: str) -> tuple[Ints, Floats]:
         Other numbers of coordinates; a point that is more than a cell away from the body.
     """
     nodes = nearest_nodes(mesh, x, label)
-    cell, bary = (np.array(values) for values in locate(mesh, x))
+    cell, bary = locate(mesh, x)
     rows = np.nonzero(cell < 0)[0]
     if len(rows):
         cell[rows], feet = nearest_on_boundary(mesh, x[rows])
-        bary[rows] = np.maximum(barycentric(mesh, cell[rows], feet), 0.0)
-        bary /= bary.sum(axis=1, keepdims=True)
+        place = np.maximum(barycentric(mesh, cell[rows], feet), 0.0)
+        bary[rows] = place / place.sum(axis=1, keepdims=True)
     ends = np.concatenate([np.repeat(np.arange(mesh.n_points)[:, None], 2, axis=1), mesh.edges])
     ends_of_node = ends[nodes]
     is_node = np.linalg.norm(mesh.points[ends_of_node].mean(axis=1) - x, axis=1) <= (
