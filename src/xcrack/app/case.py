@@ -33,7 +33,6 @@ from xcrack.fatigue.load_program import LoadProgram
 from xcrack.fatigue.retardation import plastic_zone
 from xcrack.growth.options import GrowthOptions, GrowthRule
 from xcrack.linalg.direct import pardiso
-from xcrack.mesh.fitted_curves import fit_curves
 from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.mesh.parts import part, selector
 from xcrack.mesh.refinement import refine
@@ -48,12 +47,7 @@ _BODIES = ("mesh", "deck", "specimen")  # of which a file has one
 _SECTIONS = ("title", "units", *_BODIES, "material", "cracks", "supports", "loads", "handbook",
              "solve", "numerics", "growth", "life", "retarded", "inspection", "strength",
              "output")  # fmt: skip
-_MORE_OF_MESH = (
-    "fit_curves",
-    "refine",
-    "parts",
-    "cell_sets",
-)  # beside its own arguments
+_MORE_OF_MESH = ("refine", "parts", "cell_sets")  # beside the arguments of what makes it
 _CHOICES = ("contact", "order", "friction")  # of the problem
 _SOLVING = ("error", "solver", "tolerance", "max_unknowns")  # of solve and adapt
 _TABLES = (
@@ -268,9 +262,7 @@ def _mesh(table: Table) -> Mesh:
 
 
 def _changed_mesh(table: Table, mesh: Mesh) -> Mesh:
-    """The mesh with curves, refined, with parts of its facet sets, and cell sets by boxes."""
-    if "fit_curves" in table:
-        mesh = values.called_with(table.table("fit_curves"), fit_curves, arguments={"mesh": mesh})
+    """The mesh refined, with parts of its facet sets, and cell sets by boxes."""
     if "refine" in table:
         is_list = isinstance(table.content["refine"], list)
         for refinement in table.tables("refine") if is_list else [table.table("refine")]:

@@ -24,7 +24,7 @@ from xcrack.mesh.abaqus import abaqus_text, read_abaqus
 from xcrack.mesh.ansys import read_ansys
 from xcrack.mesh.curved_facets import CurvedFacets
 from xcrack.mesh.curves import Curve, check_on_curves
-from xcrack.mesh.fitted_curves import warn_of_chords
+from xcrack.mesh.fitted_curves import Fit, with_fitted_curves
 from xcrack.mesh.keywords import KeywordUse, missed_words
 from xcrack.mesh.linear import SHAPES, base_kind, linear_mesh
 from xcrack.mesh.mesh import Mesh, sound_mesh
@@ -55,7 +55,7 @@ _MISSED_SETS = 12  # that a message names
 
 
 @check_arguments(MeshError)
-def read_mesh(path: FileName, *, strict: Switch = False) -> Mesh:
+def read_mesh(path: FileName, *, strict: Switch = False, fit_curves: Fit = False) -> Mesh:
     """Read a mesh with its sets, and make triangles (2D) or tetrahedra (3D) of its cells.
 
     Of cells of second or higher order the corners are used, and of their midside nodes the shape
@@ -72,6 +72,9 @@ def read_mesh(path: FileName, *, strict: Switch = False) -> Mesh:
         binary), ``.inp`` (Abaqus), ``.vtu``, ``.vtk``, ``.mesh``, ``.xdmf`` ...
     strict : bool
         Refuse cells that would be changed: only linear triangles and tetrahedra are taken.
+    fit_curves : bool, str or sequence of str
+        Give straight cells the curves through their points, of the whole boundary or of some sets,
+        as `fit_curves` does.
 
     Returns
     -------
@@ -124,9 +127,7 @@ def read_mesh(path: FileName, *, strict: Switch = False) -> Mesh:
         parts.append(message)
     if parts:
         warn(f"{path.name}: {'; '.join(parts)}.")
-    mesh = with_stored_curves(mesh, path)
-    warn_of_chords(mesh, path.name)
-    return mesh
+    return with_fitted_curves(with_stored_curves(mesh, path), fit_curves, path.name)
 
 
 def raw_mesh_of(path: Path) -> tuple[RawMesh, list[KeywordUse]]:

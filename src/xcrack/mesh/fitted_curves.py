@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from xcrack.base.arguments import CheckedBy, Error, Number, Part, check_arguments
 from xcrack.base.arrays import Floats, Ints, at
-from xcrack.base.checks import entries
+from xcrack.base.checks import entries, flag
 from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.curved_facets import raised_lattice, with_curves
 from xcrack.mesh.mesh import Mesh, facet_set, numbers_of
@@ -76,21 +76,39 @@ def fit_curves(
     return with_curves(mesh, facets, raised_lattice(mesh, facets, pairs, middles))
 
 
-def warn_of_chords(mesh: Mesh, source: str) -> None:
-    """Say where facets look like coarse chords of a curve that a mesh does not know.
+def _sets_to_fit(value: Any, label: str, error: Error) -> bool | tuple[str, ...]:
+    """Yes or no, or names of facet sets."""
+    return (
+        flag(value, label, error=error)
+        if isinstance(value, bool)
+        else (_set_names(value, label, error))
+    )
+
+
+Fit = Annotated[bool | str | Sequence[str], CheckedBy(_sets_to_fit)]
+
+
+def with_fitted_curves(mesh: Mesh, sets: bool | str | Sequence[str], source: str) -> Mesh:
+    """The mesh of a file with the curves that are asked for, or a warning where it looks like them.
 
     Parameters
     ----------
     mesh : Mesh
+    sets : bool or names
+        True: of the whole boundary.
     source : str
         Name of the file, for the message.
     """
+    if sets is True:
+        return fit_curves(mesh)
+    if sets:
+        return fit_curves(mesh, sets)
     curved_numbers = [numbers_of(mesh, mesh.facet_sets[name]) for name in mesh.curves]
     facets = mesh.boundary
     if curved_numbers:
         facets = facets[~np.isin(numbers_of(mesh, facets), np.concatenate(curved_numbers))]
     if not len(facets):
-        return
+        return mesh
     pairs, offset = _arcs(mesh, facets, _ANGLE)
     length = np.linalg.norm(mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]], axis=1)
     turn = 8 * np.linalg.norm(offset, axis=1) / length
@@ -100,9 +118,10 @@ def warn_of_chords(mesh: Mesh, source: str) -> None:
             f"{source}: facets near {at(mesh.points[pairs[k, 0]])} turn by about "
             f"{np.degrees(turn[k]):.0f} degrees from one to the next, like chords of a curve that "
             f"straight cells have lost: K at a crack there is then about {turn[k] ** 2 / 12:.1%} "
-            "off. xc.fit_curves(mesh) takes the curves through the points, cells of second order "
-            "hold them."
+            "off. Read with fit_curves=True it has the curves through its points; cells of second "
+            "order hold them."
         )
+    return mesh
 
 
 def _arcs(mesh: Mesh, facets: Ints, angle: float) -> tuple[Ints, Floats]:
@@ -261,4 +280,4 @@ def _curvature_between(a: Floats, b: Floats) -> Floats:
     return np.where(a * b <= 0, 0.0, np.where(is_alike, (a + b) / 2, smaller))
 
 
-__all__ = ["fit_curves", "warn_of_chords"]
+__all__ = ["Fit", "fit_curves", "with_fitted_curves"]

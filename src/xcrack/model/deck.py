@@ -25,6 +25,7 @@ from xcrack.mesh.files import (
     sets_without_facets,
     with_stored_curves,
 )
+from xcrack.mesh.fitted_curves import Fit, with_fitted_curves
 from xcrack.mesh.keywords import KeywordUse, missed_words, table_of
 from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh
@@ -221,6 +222,7 @@ def read_deck(
     *,
     time: Annotated[float, Number(least=0)] | None = None,
     ignore: Annotated[Sequence[str], Parts(str, 'keywords such as "TIE"')] = (),
+    fit_curves: Fit = False,
 ) -> Deck:
     """Read a deck of another program: body, materials, supports and the loads of a step.
 
@@ -240,6 +242,8 @@ def read_deck(
     ignore : sequence of str
         Keywords such as ``"TIE"`` that are refused otherwise, since without them the body or its
         loading is another one.
+    fit_curves : bool, str or sequence of str
+        Give straight cells the curves through their points, as `fit_curves` does.
 
     Returns
     -------
@@ -265,7 +269,7 @@ def read_deck(
     left_out = {" ".join(name.upper().lstrip("*").split()) for name in ignore}
     with system_errors("cannot read the deck", path):
         if path.suffix.lower() != ".inp":
-            return _mesh_deck(path)
+            return _mesh_deck(path, fit_curves)
         model = read_model(path)
     steps = steps_of(model)
     step_of_loads = chosen_step(steps, step, path.name)
@@ -284,7 +288,7 @@ def read_deck(
     _tell_missed(path, uses)
     return Deck(
         path=path,
-        mesh=body.finished_mesh(scene.more_facets),
+        mesh=with_fitted_curves(body.finished_mesh(scene.more_facets), fit_curves, path.name),
         material=material,
         supports=tuple(supports),
         loads=tuple(deck_loads),
@@ -305,13 +309,13 @@ def read_deck(
     )  # fmt: skip
 
 
-def _mesh_deck(path: Path) -> Deck:
+def _mesh_deck(path: Path, fit_curves: bool | str | Sequence[str]) -> Deck:
     """A deck of which mesh and sets alone are taken."""
     raw_mesh, uses = raw_mesh_of(path)
     raw_mesh = linear_mesh(raw_mesh, path.name, strict=False)
     points, cells, facet_sets, cell_sets, number = mesh_parts(raw_mesh, path.name)
     mesh = with_curved_edges(Mesh(points, cells, facet_sets, cell_sets), raw_mesh, number)
-    mesh = with_stored_curves(mesh, path)
+    mesh = with_fitted_curves(with_stored_curves(mesh, path), fit_curves, path.name)
     _tell_missed(path, uses, sets_without_facets(raw_mesh, mesh))
     return Deck(path, mesh, keywords=tuple(uses))
 

@@ -12,7 +12,6 @@ from xcrack.base.errors import MeshError, ProblemError, warn
 from xcrack.mesh.abaqus import MESH_KEYWORDS, AbaqusModel
 from xcrack.mesh.fields import CellField, Field
 from xcrack.mesh.files import with_stored_curves
-from xcrack.mesh.fitted_curves import warn_of_chords
 from xcrack.mesh.keywords import Keyword
 from xcrack.mesh.linear import linear_mesh
 from xcrack.mesh.mesh import Mesh, nearest_nodes, numbers_of, sound_mesh
@@ -185,7 +184,6 @@ class DeckBody:
         mesh = Mesh(points, simplices, facet_sets)
         mesh = with_curved_edges(mesh, linear_raw, self._number)
         self.mesh = with_stored_curves(mesh, model.path)
-        warn_of_chords(self.mesh, source)
         ends = model.edge_of_middle_node()
         self._ends = np.full((len(model.points), 2), -1, dtype=np.int64)
         if ends:
