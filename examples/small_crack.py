@@ -35,21 +35,8 @@ OUT.mkdir(parents=True, exist_ok=True)
 HOLES = ((-8.0, 0.0, 3.0), (10.0, 8.0, 4.0), (9.0, -11.0, 2.5))  # x, y, radius
 A, TENSION, THICKNESS = 1.0, 100.0, 10.0
 
-
-def cylinder(x0, y0, radius):
-    """Nearest points on the wall of a hole."""
-
-    def nearest(x):
-        off = x[:, :2] - (x0, y0)
-        wall = (x0, y0) + radius * off / np.linalg.norm(off, axis=1)[:, None]
-        return np.concatenate([wall, x[:, 2:]], axis=1)
-
-    return nearest
-
-
-given = xc.read_mesh(Path(__file__).parent / "meshes" / "small_crack.msh")
-curves = {f"hole_{k}": cylinder(*hole) for k, hole in enumerate(HOLES)}
-mesh = xc.Mesh(given.points, given.cells, given.facet_sets, curves=curves)
+file = Path(__file__).parent / "meshes" / "small_crack.msh"
+mesh = xc.read_mesh(file, fit_curves=True)
 print(mesh)
 
 # %% A quarter circle at the corner of the first hole: it lies within a cell or two
@@ -109,7 +96,7 @@ assert adapted.rounds[-1].unknowns < 300_000
 fine = adapted.problem.mesh
 assert fine.cell_size.max() > 15 * fine.cell_size.min()
 wall = fine.points[np.unique(fine.facet_sets["hole_0"])]
-assert np.allclose(np.hypot(wall[:, 0] - x, wall[:, 1] - y), radius, rtol=1e-9)
+assert np.allclose(np.hypot(wall[:, 0] - x, wall[:, 1] - y), radius, rtol=2e-3)  # 6 % before
 if not QUICK:  # the finest of the meshes of the second run, at the places of the first
     finest, own = runs[0.002].sif, ~adapted.sif.at_surface
     there = np.nonzero(~finest.at_surface)[0]
