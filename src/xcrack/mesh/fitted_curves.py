@@ -3,7 +3,8 @@
 Files of linear cells have lost their curves; the points are still on them. Around each point of a
 smooth side a paraboloid is laid through its neighbours: where all of these are on a circle (2D), a
 sphere or a cylinder seen along it, the curvature 2 d·n / d² of the circle through both points with
-the normal n is exact at any distance d.
+the normal n (Taubin 1995, Estimating the tensor of curvature of a surface from a polyhedral
+approximation) is exact at any distance d.
 """
 
 from collections.abc import Sequence
@@ -78,11 +79,9 @@ def fit_curves(
 
 def _sets_to_fit(value: Any, label: str, error: Error) -> bool | tuple[str, ...]:
     """Yes or no, or names of facet sets."""
-    return (
-        flag(value, label, error=error)
-        if isinstance(value, bool)
-        else (_set_names(value, label, error))
-    )
+    if isinstance(value, bool):
+        return flag(value, label, error=error)
+    return _set_names(value, label, error)
 
 
 Fit = Annotated[bool | str | Sequence[str], CheckedBy(_sets_to_fit)]
@@ -216,10 +215,14 @@ def _normals(x: Floats, ring: tuple[Ints, Ints], normal: Floats) -> Floats:
         weight = (scale[row] / length) ** _NEARNESS
         value = 2 * np.einsum("qd,qd->q", d, normal[row]) / length
         rows = weight[:, None] * table
-        matrix = np.add.reduceat(rows[:, :, None] * table[:, None], first)
+        n = table.shape[1]
+        matrix = np.empty((len(x), n, n))
+        for i in range(n):
+            for j in range(n):
+                matrix[:, i, j] = np.add.reduceat(rows[:, i] * table[:, j], first)
         vector = np.add.reduceat(rows * value[:, None], first)
         size = np.trace(matrix, axis1=1, axis2=2)[:, None, None]
-        fit = np.linalg.solve(matrix + _LEAST * size * np.eye(table.shape[1]), vector[..., None])
+        fit = np.linalg.solve(matrix + _LEAST * size * np.eye(n), vector[..., None])
         tilt = fit[:, len(squares) :, 0]
         normal = normal - np.einsum("pk,pkd->pd", tilt, tangents)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
