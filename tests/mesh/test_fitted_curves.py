@@ -154,3 +154,23 @@ def test_a_file_that_has_lost_its_curves_says_so(tmp_path):
     assert not read(tmp_path, ring(24))
     assert not read(tmp_path, xc.fit_curves(ring(12)))
     assert not read(tmp_path, xc.box((0, 0), (1, 1), 3))
+
+
+def test_a_tolerance_in_space_names_chords_that_matter_more():
+    """A bar of 16 chords: K beside them is off by 1.3 %."""
+    bar = rounded_cube(4, 2)
+    crack = xc.elliptic_crack((0.0, 1.0, 0.01), (0, 0, 1), (1, 0, 0), 0.4, 0.4)
+    at_end = np.abs(np.abs(bar.points[bar.boundary][:, :, 2]) - 1).max(axis=1) < ROUND_OFF
+    ends = {"ends": bar.boundary[at_end]}
+    bar = xc.Mesh(bar.points, bar.cells, ends)
+    for mesh, tolerance, count in ((bar, 0.005, 1), (bar, 0.05, 0), (xc.fit_curves(bar), 0.005, 0)):
+        loads = [xc.traction("ends", lambda x, n: n)]
+        problem = xc.Problem(mesh, xc.Isotropic(1.0, 0.3), [crack], loads=loads)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            with pytest.raises(xc.ProblemError, match="max_unknowns"):
+                xc.adapt(problem, tolerance, max_unknowns=10, progress=False)
+        messages = [str(m.message) for m in caught if "like chords" in str(m.message)]
+        assert len(messages) == count
+        if count:
+            assert "xc.fit_curves(mesh) has the curves" in messages[0]

@@ -21,6 +21,7 @@ from xcrack.adaptivity.resolved import CELLS, resolved_fronts
 from xcrack.base.arrays import Floats
 from xcrack.crack.crack import Crack
 from xcrack.crack.measures import surface_size
+from xcrack.mesh.fitted_curves import OF_TURN, warn_of_chords
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import graded_sizes, points_between, radii, refine, with_room
@@ -39,8 +40,11 @@ _SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
 def coarse_mesh(problem: Problem, tolerance: float) -> Mesh:
     """The first mesh of a scene in 3D: cells along its fronts as large as the tolerance lets them.
 
-    Their bars are within it in most scenes (measured), else one more round is.
+    Their bars are within it in most scenes (measured), else one more round is. They know nothing of
+    curves that the mesh does not: where these would change K by more, a warning says so.
     """
+    turn = float(np.sqrt(OF_TURN * tolerance))
+    warn_of_chords(problem.mesh, "the mesh", turn, "xc.fit_curves(mesh) has")
     return first_mesh(problem, float(np.clip((tolerance / _BAR) ** (1 / _RISE), 1.0, _COARSEST)))
 
 

@@ -25,6 +25,7 @@ from xcrack.mesh.simplex import outward_areas
 
 _ANGLE = 50.0  # degrees: facets that turn by more meet at a corner
 _COARSE = 20.0  # degrees from which a mesh that is read says that it looks like chords
+OF_TURN = 12.0  # square of a turn over the change of K beside it, measured at holes (docs/body.md)
 _PASSES = 4  # in which normals come to rest
 _ALIKE = 1.5  # ratio of the curvatures at the ends of an edge up to which their mean is taken
 _PARALLEL = 0.9  # cosine of the angle from which two sides are one at their edge
@@ -102,32 +103,50 @@ def with_fitted_curves(mesh: Mesh, sets: bool | str | Sequence[str], source: str
         return fit_curves(mesh)
     if sets:
         return fit_curves(mesh, sets)
+    warn_of_chords(mesh, source, float(np.radians(_COARSE)), "Read with fit_curves=True it has")
+    return mesh
+
+
+def warn_of_chords(mesh: Mesh, label: str, least_turn: float, remedy: str) -> None:
+    """Say where facets without a curve turn like chords of one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    label : str
+        What the message begins with.
+    least_turn : float, rad
+        From one facet to the next, of which nothing is said.
+    remedy : str
+        What has the curves through the points of the mesh.
+    """
     curved_numbers = [numbers_of(mesh, mesh.facet_sets[name]) for name in mesh.curves]
     facets = mesh.boundary
     if curved_numbers:
         facets = facets[~np.isin(numbers_of(mesh, facets), np.concatenate(curved_numbers))]
     if not len(facets):
-        return mesh
+        return
+    cosine = _cosines(_facet_normals(mesh, facets), *_joints(facets))
+    if not ((cosine > np.cos(np.radians(_ANGLE))) & (cosine < np.cos(least_turn / 2))).any():
+        return
     pairs, offset = _arcs(mesh, facets, _ANGLE)
     length = np.linalg.norm(mesh.points[pairs[:, 1]] - mesh.points[pairs[:, 0]], axis=1)
     turn = 8 * np.linalg.norm(offset, axis=1) / length
     k = int(np.argmax(turn))
-    if turn[k] > np.radians(_COARSE):
+    if turn[k] > least_turn:
+        change = turn[k] ** 2 / OF_TURN
         warn(
-            f"{source}: facets near {at(mesh.points[pairs[k, 0]])} turn by about "
+            f"{label}: facets near {at(mesh.points[pairs[k, 0]])} turn by about "
             f"{np.degrees(turn[k]):.0f} degrees from one to the next, like chords of a curve that "
-            f"straight cells have lost: K at a crack there is then about {turn[k] ** 2 / 12:.1%} "
-            "off. Read with fit_curves=True it has the curves through its points; cells of second "
-            "order hold them."
+            f"straight cells have lost: K at a crack there is then about {change:.1%} "
+            f"off. {remedy} the curves through its points; cells of second order hold them."
         )
-    return mesh
 
 
 def _arcs(mesh: Mesh, facets: Ints, angle: float) -> tuple[Ints, Floats]:
     """Edges of facets `(e, 2)`, and how far the curve through the points is off their middles."""
-    normal = outward_areas(mesh, facets, "fit_curves")
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    side = _sides(facets, normal, _labels(mesh, facets), float(np.cos(np.radians(angle))))
+    normal = _facet_normals(mesh, facets)
+    side = _sides(facets, normal, _labels(mesh, facets), angle)
     # A point of two sides has a normal of each.
     key, node = np.unique(
         np.stack([np.repeat(side, mesh.dim), facets.ravel()], axis=1), axis=0, return_inverse=True
@@ -137,6 +156,11 @@ def _arcs(mesh: Mesh, facets: Ints, angle: float) -> tuple[Ints, Floats]:
     x = mesh.points[key[:, 1]]
     normals = _normals(x, _ring(edges, len(x)), _mean_normals(corner, normal, len(x)))
     return _at_shared_edges(key[edges, 1], *_heights(x, normals, edges))
+
+
+def _facet_normals(mesh: Mesh, facets: Ints) -> Floats:
+    normal = outward_areas(mesh, facets, "fit_curves")
+    return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
 def _edges(corner: Ints) -> Ints:
@@ -152,11 +176,8 @@ def _labels(mesh: Mesh, facets: Ints) -> Ints:
     return np.unique(np.array(members), axis=1, return_inverse=True)[1].ravel()
 
 
-def _sides(facets: Ints, normal: Floats, label: Ints, least_cosine: float) -> Ints:
-    """Number of the smooth side of each facet `(k,)`: no turn from one to the next is sharp.
-
-    Where sets divide the boundary a curve may end, as where a straight side goes on.
-    """
+def _joints(facets: Ints) -> tuple[Ints, Ints]:
+    """Pairs of facets `(j,)` that meet at an edge, or at a point in 2D."""
     count, d = facets.shape
     joints = np.concatenate([facets[:, list(c)] for c in combinations(range(d), d - 1)])
     owner = np.tile(np.arange(count), d)
@@ -165,12 +186,23 @@ def _sides(facets: Ints, normal: Floats, label: Ints, least_cosine: float) -> In
     )
     order = np.argsort(group.ravel(), kind="stable")
     first = np.concatenate([[0], np.cumsum(members)])[:-1][members == 2]
-    a, b = owner[order[first]], owner[order[first + 1]]
-    is_smooth = (label[a] == label[b]) & (
-        np.einsum("jd,jd->j", normal[a], normal[b]) > least_cosine
-    )
+    return owner[order[first]], owner[order[first + 1]]
+
+
+def _cosines(normal: Floats, a: Ints, b: Ints) -> Floats:
+    """Of the angles between the normals of facets `(j,)`."""
+    return np.asarray(np.einsum("jd,jd->j", normal[a], normal[b]))
+
+
+def _sides(facets: Ints, normal: Floats, label: Ints, angle: float) -> Ints:
+    """Number of the smooth side of each facet `(k,)`: no turn from one to the next is sharp.
+
+    Where sets divide the boundary a curve may end, as where a straight side goes on.
+    """
+    a, b = _joints(facets)
+    is_smooth = (label[a] == label[b]) & (_cosines(normal, a, b) > np.cos(np.radians(angle)))
     links = (np.ones(int(is_smooth.sum())), (a[is_smooth], b[is_smooth]))
-    graph = coo_array(links, shape=(count, count))
+    graph = coo_array(links, shape=(len(facets),) * 2)
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
@@ -283,4 +315,4 @@ def _curvature_between(a: Floats, b: Floats) -> Floats:
     return np.where(a * b <= 0, 0.0, np.where(is_alike, (a + b) / 2, smaller))
 
 
-__all__ = ["Fit", "fit_curves", "with_fitted_curves"]
+__all__ = ["OF_TURN", "Fit", "fit_curves", "warn_of_chords", "with_fitted_curves"]
