@@ -28,7 +28,9 @@ from xcrack.mesh.refinement import graded_sizes, points_between, radii, refine, 
 from xcrack.model.problem import Problem
 from xcrack.sif.sif import SIF, KErrors
 
-_BAR, _RISE, _COARSEST = 0.0064, 2.0, 3.0  # bars over K on the first mesh, in pennies, and coarser
+# The tolerance of the first mesh at which fronts are just seen, the power of coarser ones (of least
+# time, second rounds included: 1.25 times coarser at 1 %, 3 at 3 %), and the coarsest.
+_BAR, _RISE, _COARSEST = 0.00756, 1.255, 3.0
 _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
 _BEND = 0.6  # of the radius of curvature of a front: the domains of K have to fit into it

@@ -281,7 +281,7 @@ def _engine(
 ) -> Engine:
     """A factorisation, or in 3D above some size conjugate gradients."""
     space_, basis = model.space, problem.numerics.tip_basis
-    if solver is None and takes_iterations(problem, space_.n_dof, has_contact):
+    if solver is None and takes_iterations(problem, space_.n_dof, has_contact, reuse is None):
         # Rows beside the crack are enough where no basis is changed but that of single nodes.
         by_parts = space_.order == 1 and basis is None
         return iterative_system(

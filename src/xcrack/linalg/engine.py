@@ -16,6 +16,8 @@ from xcrack.model.problem import Problem
 
 # Unknowns of a 3D body above which a factorisation costs more, by order (measured).
 _DIRECT = {1: 4_000, 2: 8_000}
+# And at order 2 where no step of a run comes before or behind, which would share its levels.
+_DIRECT_ALONE = 15_000
 # With friction conjugate gradients solve once for each row of pressure and shear: at 4 800 unknowns
 # of order 1 a factor takes a seventh of their time, at 17 000 of order 2 a seventeenth, and beyond
 # these unknowns more than 1.4 GB.
@@ -306,7 +308,9 @@ def is_open_first(problem: Problem, n: int) -> bool:
     return takes_iterations(problem, n, has_contact=False) and not takes_iterations(problem, n)
 
 
-def takes_iterations(problem: Problem, n: int, has_contact: bool = True) -> bool:
+def takes_iterations(
+    problem: Problem, n: int, has_contact: bool = True, is_alone: bool = True
+) -> bool:
     """Whether a system of n unknowns is solved by conjugate gradients.
 
     Parameters
@@ -315,12 +319,16 @@ def takes_iterations(problem: Problem, n: int, has_contact: bool = True) -> bool
     n : int
     has_contact : bool
         Whether faces that have friction touch.
+    is_alone : bool
+        Whether the scene is solved for itself, and not as a step of a run.
     """
     linear_solver = problem.numerics.linear
     if linear_solver != "auto":
         return linear_solver == "iterative"
     is_rubbing = has_contact and may_rub(problem)
     n_direct = _DIRECT_WITH_FRICTION if is_rubbing else _DIRECT[problem.order or 1]
+    if is_alone and problem.order == 2:
+        n_direct = max(n_direct, _DIRECT_ALONE)
     is_large = problem.mesh.dim == 3 and n > n_direct
     if problem.order == 2 and any(crack.ends_on for crack in problem.cracks):
         return False  # quadratic functions of both cracks nearly vanish together beside a junction

@@ -51,6 +51,7 @@ from xcrack.sif.sides_3d import (
 from xcrack.sif.sif import SIF, SurfaceEnd
 
 SECOND = 0.7  # outer radius of the second domain, as a share of the first
+SHORT = 0.55  # and of the third one, to which error bars compare smooth K
 _OUTER = 2.6  # wanted outer radius, in legs of the cells at the front
 # Outer radius in radii of the enriched tube: the error sits in the cells at its rim, and a domain
 # that reaches beyond them makes K of a penny 1 % too low.
@@ -82,13 +83,13 @@ class FrontValues:
     ----------
     knots : (p,) array, length
         Parameters of the tops.
-    K : (n, 2, p, 3) array, stress · √length
-        Of n states and two domains; nan where nothing is known.
+    K : (n, 3, p, 3) array, stress · √length
+        Of n states and three domains; nan where nothing is known.
     mean_K : (n, p, 3) array, stress · √length
         Means over the hats, of the first domains.
     is_known : (p,) array of bool
         Hats whose integrals are known.
-    wide_K : (n, 2, p, 3) array, stress · √length
+    wide_K : (n, 3, p, 3) array, stress · √length
         K there, with hats twice as wide.
     is_smooth : (p,) array of bool
         Hats at smooth planes perpendicular to the front.
@@ -165,7 +166,7 @@ def front_intensity(solutions: Sequence[Solution], t: int) -> list[SIF]:
     matrix = reading_of_modes(values.knots, values.is_known, curve, all_places, values.is_smooth)
     K = np.einsum("msv,nkvm->nksm", matrix, values.K[:, :, values.is_known])
     K_of_wide = np.einsum("msv,nvm->nsm", matrix, values.wide_K[:, 0][:, values.is_known])
-    smooth_K = smooth_values(values.K, values.is_known, is_closed)[:, :, values.is_known]
+    smooth_K = smooth_values(values.K[:, ::2], values.is_known, is_closed)[:, :, values.is_known]
     smooth_K = np.einsum("msv,nkvm->nksm", matrix, smooth_K)
     if not materials.is_one:
         of_material = materials.factors(all_places)
@@ -336,7 +337,7 @@ def front_values(
     is_valid = room_at_sides > _LEAST * size
     room = np.where(is_valid, np.minimum(room, room_at_sides), room)
     radius = np.clip(room, _LEAST * size, target_radius)
-    radii = np.interp(tops, knots, radius)[:, None] * np.array([1.0, SECOND])
+    radii = np.interp(tops, knots, radius)[:, None] * np.array([1.0, SECOND, SHORT])
     r_outer = float(radius.max())
     distance = curve.distance(space.mesh.points, r_outer)
     turn = np.stack([mean_rotation(s, distance, r_outer) for s in solutions], axis=-1)

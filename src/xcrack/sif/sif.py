@@ -134,7 +134,8 @@ class SIF:
     widened : (f, d) array, stress · √length, optional
         In 3D: difference of K to that of hats along the front which are twice as wide.
     smooth_K : (f, 2, d) array, stress · √length, optional
-        In 3D: K of both domains on smooth curves along the front; error bars are about the first.
+        In 3D: K of the largest and the smallest domain on smooth curves along the front; error
+        bars are about the first.
     E_prime, nu : (f,) arrays, optional
         Of the material there: E / (1 - nu²), in plane stress E (stress), and Poisson's ratio.
 
