@@ -70,7 +70,7 @@ def assembly() -> None:
             _, indices, slot = block_pattern(nodes, mesh.n_points)
             middle = time.process_time()
             data = np.zeros((len(indices), dim, dim))
-            add_block_stiffness(data, cells, slot, *fixed, 1.0, 0.7, None)
+            add_block_stiffness(data, 0, len(indices), cells, slot, *fixed, 1.0, 0.7, None)
             times["pattern"].append(middle - begin)
             times["values"].append(time.process_time() - middle)
         each = {k: 1e9 * median(v[1:]) / len(mesh.cells) for k, v in times.items()}

@@ -1,5 +1,10 @@
 """Kernels against twins without tricks, and kernels that stand for many calls of numpy."""
 
+import importlib
+from collections import defaultdict
+from pathlib import Path
+
+import numba
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -7,6 +12,8 @@ from scipy.spatial import Delaunay
 
 import xcrack as xc
 from support import scenes_2d as scenes
+from xcrack.base.kernels.arrays import empty, zeros
+from xcrack.base.kernels.jit import kernel
 from xcrack.fem.assembly import bulk
 from xcrack.fem.kernels.functions import (
     places,
@@ -608,3 +615,69 @@ def test_moments_are_solved_as_by_pinv(count):
     result, scratch = defect.copy(), gram.copy()
     solve_moments(result, scratch, 1e-12)
     np.testing.assert_allclose(result, wanted, rtol=1e-9)  # round-off times the condition
+
+
+# --- what a first run compiles: new arrays in place, each kernel for one kind of arguments ---
+
+
+@kernel
+def new_arrays(n, m, like):  # type: ignore[no-untyped-def]
+    full = empty(n, np.int32)
+    for i in range(n):
+        full[i] = i
+    short = empty((n, m))
+    for i in range(n):
+        for j in range(m):
+            short[i, j] = i + 10 * j
+    return full, short, zeros((n, 2, m)), zeros(m, np.bool_), zeros((m, m), like.dtype)
+
+
+@pytest.mark.parametrize(("n", "m"), [(5, 3), (1, 70), (0, 4), (4, 0)])
+def test_new_arrays_are_those_of_numpy(n: int, m: int) -> None:
+    """Type, shape, strides and values; twice, for memory that was in use before."""
+    expected = (
+        np.arange(n, dtype=np.int32), np.add.outer(np.arange(n), 10.0 * np.arange(m)),
+        np.zeros((n, 2, m)), np.zeros(m, bool), np.zeros((m, m), np.uint8),
+    )  # fmt: skip
+    for _ in range(2):
+        for array, wanted in zip(new_arrays(n, m, np.ones(1, np.uint8)), expected, strict=True):
+            assert (array.dtype, array.shape) == (wanted.dtype, wanted.shape)
+            assert array.flags.c_contiguous
+            assert array.flags.writeable
+            np.testing.assert_array_equal(array, wanted)
+            array[...] = 1  # not zero where it is handed out again
+
+
+@pytest.mark.parametrize(("n", "m"), [(-1, 2), (2, -3), (-1, 0), (2**40, 2**20), (2**40, 2**30)])
+def test_arrays_without_memory(n: int, m: int) -> None:
+    """An error as numpy has one, not a crash."""
+    with pytest.raises((MemoryError, ValueError)):
+        new_arrays(n, m, np.ones(1, np.uint8))
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_kernels_are_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No kernel meets arguments of two kinds: it would be compiled twice in a first run."""
+    kinds = defaultdict(set)
+
+    def record(name, dispatcher):  # type: ignore[no-untyped-def]
+        def call(*args):  # type: ignore[no-untyped-def]
+            kinds[name].add(tuple(str(numba.typeof(a)) for a in args))
+            return dispatcher(*args)
+
+        return call
+
+    for path in Path(xc.__file__).parent.glob("*/kernels/*.py"):
+        module = importlib.import_module(f"xcrack.{path.parts[-3]}.kernels.{path.stem}")
+        for name, value in list(vars(module).items()):
+            if isinstance(value, numba.core.dispatcher.Dispatcher) and name[0] != "_":
+                monkeypatch.setattr(module, name, record(f"{path.stem}.{name}", value))
+    scene = xc.Problem(
+        xc.box((-1, -1), (1, 1), 10), xc.Isotropic(1.0, 0.3, "strain"),
+        [xc.line_crack([(-1.2, 0.03), (0.1, 0.07)])],
+        loads=[xc.pressure("top", 1.0), xc.pressure("bottom", 1.0)],
+    )  # fmt: skip
+    sif = xc.stress_intensity(xc.solve(scene))
+    assert np.isfinite(sif.K).all()
+    assert len(kinds) > 30
+    assert [name for name, sets in kinds.items() if len(sets) > 1] == []

@@ -49,7 +49,10 @@ def _plane_points(
     from xcrack.mesh.kernels.splitting import triangle_points
 
     mesh = space.mesh
-    circles = circles or Circles(np.zeros(2), np.zeros(0))
+    # A copy is never read-only, for which the kernel would be compiled once more.
+    centre, radii = np.zeros(2), np.zeros(0)
+    if circles:
+        centre, radii = np.array(circles.centre), np.array(circles.radii)
     tips = np.array([tip.x for tip in space.tips]).reshape(-1, 2)
     # Bisected, they are no larger than their distance to a tip: a lower degree than in the fans is
     # enough (K is the same to its error with half of the points, measured), and one whose rule does
@@ -59,7 +62,7 @@ def _plane_points(
     number, place, share = triangle_points(
         subs.bary, corners, subs.fraction, with_tip, subs.fan, tips, _LEVELS,
         *simplex_rule(2, degree), *simplex_rule(2, degree_of_simplex), *gauss(n + 1), *gauss(n + 4),
-        circles.centre, circles.radii,
+        centre, radii,
     )  # fmt: skip
     return number, place, share
 

@@ -4,6 +4,8 @@ Much of numba's work on a function is for what kernels do not have: closures, ge
 expressions, object mode; and its helpers are optimised and turned into machine code of their own
 before they are made part of their callers. Kernels leave this out, by numba's own means: a list of
 passes, and a library for helpers that stays code to be linked. It halves the time of a first run.
+What an operator means for given types is looked up once (`_signature`), and new arrays are made in
+place (`arrays.py`): another quarter.
 
 numba keeps compiled code beside the source or in the user's cache folder. It raises where neither
 may be written to (containers, clusters), and at every later run once a cache file is damaged.
@@ -21,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import caching
+from numba.core import caching, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
@@ -47,6 +49,12 @@ class _Library(JITCodeLibrary):
 
     def _optimize_functions(self, ll_module: Any) -> None:
         ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        # numba's passes run twice, the first time for its counts of references, at the highest of
+        # three levels: half as long again, for kernels that are a little slower (measured).
+        passes, builder = self._codegen._module_pass_manager(opt=2)
+        passes.run(self._final_module, builder)
 
 
 class _HelperLibrary(_Library):
@@ -97,6 +105,25 @@ class _Flags(Flags):
 _FLAGS_HASH = hash(Flags())  # the same for all of them: of their names
 
 
+_LOOK_UP = types.BaseFunction.get_call_type
+_SIGNATURES: dict[Any, Any] = {}  # what was found, by function and types of its arguments
+
+
+def _signature(function: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Signature of a call, found once.
+
+    numba looks through all that an operator may mean, each time that it meets one and several times
+    in each compilation: twenty thousand times for less than a thousand answers. This takes the
+    place of its method while a kernel is compiled, which it does in one thread at a time.
+    """
+    if kws or not isinstance(function, types.Function):
+        return _LOOK_UP(function, context, args, kws)
+    call = function, context, tuple(args)
+    if call not in _SIGNATURES:
+        _SIGNATURES[call] = _LOOK_UP(function, context, args, kws)
+    return _SIGNATURES[call]
+
+
 class _Kernel(CompilerBase):
     """numba's passes without those that kernels do not need."""
 
@@ -110,13 +137,15 @@ class _Kernel(CompilerBase):
 
     def compile_extra(self, func: Any) -> Any:
         """Compile without the collector of garbage, which finds little and looks at everything."""
-        if not gc.isenabled():
-            return super().compile_extra(func)
+        is_collecting, look_up = gc.isenabled(), types.BaseFunction.get_call_type
         gc.disable()
+        types.BaseFunction.get_call_type = _signature
         try:
             return super().compile_extra(func)
         finally:
-            gc.enable()
+            types.BaseFunction.get_call_type = look_up
+            if is_collecting:
+                gc.enable()
 
     def define_pipelines(self) -> list[Any]:
         state, passes = self.state, PassManager("kernel")

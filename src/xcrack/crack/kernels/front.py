@@ -2,8 +2,7 @@
 
 import math
 
-import numpy as np
-
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 # Of the length along b for a unit of arc: it is zero at the centre of curvature of a front, where a
@@ -65,11 +64,11 @@ def frames_at(s, break_arcs, place, normal):  # type: ignore[no-untyped-def]
         Curvatures b'.t and b'.n, twist t'.n (by arc length), and the speed ds/dparameter.
     """
     count = len(s)
-    x = np.empty((count, 3))
-    frame = np.empty((count, 3, 3))
-    turn = np.empty((count, 4))
-    dx, ddx = np.empty(3), np.empty(3)
-    N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
+    x = empty((count, 3))
+    frame = empty((count, 3, 3))
+    turn = empty((count, 4))
+    dx, ddx = empty(3), empty(3)
+    N, dN, ddN = empty(3), empty(3), empty(3)
     piece = 0
     for q in range(count):
         piece = _piece_of(s[q], break_arcs, piece)
@@ -134,10 +133,10 @@ def feet(x, start, reach, break_arcs, place, normal, is_closed):  # type: ignore
         As of `frames_at`.
     """
     count = len(x)
-    s, offset = np.empty(count), np.empty((count, 2))
-    frame, turn = np.empty((count, 3, 3)), np.empty((count, 4))
-    X, dX, ddX = np.empty(3), np.empty(3), np.empty(3)
-    N, dN, ddN = np.empty(3), np.empty(3), np.empty(3)
+    s, offset = empty(count), empty((count, 2))
+    frame, turn = empty((count, 3, 3)), empty((count, 4))
+    X, dX, ddX = empty(3), empty(3), empty(3)
+    N, dN, ddN = empty(3), empty(3), empty(3)
     first, end = break_arcs[0], break_arcs[-1]
     period = end - first
     piece = 0
@@ -300,18 +299,18 @@ def front_terms(  # type: ignore[no-untyped-def]
     states = gradient.shape[3]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
-    U, U_turn, slope = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    G, spin = np.zeros((3, 3, 2)), np.zeros((3, 3, 2))
-    bend = np.zeros((3 if len(initial_stress) > 0 else 0, 3, 2))
-    S, dS = np.empty((3, 3, 3)), np.empty((3, 3, 3))
-    X, X1, D = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    g, sigma = np.empty((3, 3)), np.empty((3, 3))
-    S0, S1 = np.zeros((3, 3)), np.zeros((3, 3))
+    U, U_turn, slope = zeros((3, 3)), zeros((3, 3)), zeros((3, 3))
+    G, spin = zeros((3, 3, 2)), zeros((3, 3, 2))
+    bend = zeros((3 if len(initial_stress) > 0 else 0, 3, 2))
+    S, dS = empty((3, 3, 3)), empty((3, 3, 3))
+    X, X1, D = empty((3, 3)), empty((3, 3)), empty((3, 3))
+    g, sigma = empty((3, 3)), empty((3, 3))
+    S0, S1 = zeros((3, 3)), zeros((3, 3))
     domains = radii.shape[1]
     value, slope_r, change_s = (
-        np.empty((2, domains)),
-        np.empty((2, domains)),
-        np.empty((2, domains)),
+        empty((2, domains)),
+        empty((2, domains)),
+        empty((2, domains)),
     )
     for q in range(len(weight)):
         r, theta = polar_place[q, 0], polar_place[q, 1]
@@ -423,12 +422,12 @@ def surface_terms(  # type: ignore[no-untyped-def]
     states = traction.shape[2]
     kolosov = (lam + 3 * mu) / (lam + mu)
     scale = 1.0 / (2.0 * mu * math.sqrt(2.0 * math.pi))
-    U, U_turn, slope = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    G, spin, bend = np.zeros((3, 3, 2)), np.zeros((3, 3, 2)), np.zeros((0, 3, 2))
-    S = np.empty((3, 3, 3))
-    g, sigma, m_out, t = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    U, U_turn, slope = zeros((3, 3)), zeros((3, 3)), zeros((3, 3))
+    G, spin, bend = zeros((3, 3, 2)), zeros((3, 3, 2)), zeros((0, 3, 2))
+    S = empty((3, 3, 3))
+    g, sigma, m_out, t = empty((3, 3)), empty((3, 3)), empty(3), empty(3)
     domains = radii.shape[1]
-    value = np.empty((2, domains))
+    value = empty((2, domains))
     for q in range(len(weight)):
         r = polar_place[q, 0]
         if r >= _largest_radius(radii, hat[q]) or r <= 0.0:

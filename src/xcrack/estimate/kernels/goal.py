@@ -2,8 +2,7 @@
 
 import math
 
-import numpy as np
-
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 
@@ -137,7 +136,7 @@ def ring_factors(  # type: ignore[no-untyped-def]
     (q, 2, 2, 2) array
         Component, derivative, mode; zero where grad q is and nothing changes.
     """
-    result = np.zeros((len(weight), 2, 2, 2))
+    result = zeros((len(weight), 2, 2, 2))
     for p in range(len(weight)):
         dx, dy, psi_sum = -tip[0], -tip[1], 0.0
         for b in range(3):
@@ -184,8 +183,8 @@ def plain_ring(  # type: ignore[no-untyped-def]
     turn : (2,) array
         Integral of B_12 - B_21 of each mode.
     """
-    of_nodes, of_tips = np.zeros((len(plain_cells), 6, 2, 2)), np.zeros((len(plain_cells), 4, 2, 2))
-    turn, B, d = np.zeros(2), np.empty((2, 2, 2)), np.empty((10, 2))
+    of_nodes, of_tips = zeros((len(plain_cells), 6, 2, 2)), zeros((len(plain_cells), 4, 2, 2))
+    turn, B, d = zeros(2), empty((2, 2, 2)), empty((10, 2))
     for k in range(len(plain_cells)):
         e = plain_cells[k]
         G = slopes[e]
@@ -280,7 +279,7 @@ def add_to_functions(total, functions, row, number, slope, factor):  # type: ign
         Component, derivative, functional.
     """
     d, functionals, width = factor.shape[1], factor.shape[3], slope.shape[1]
-    part = np.zeros((d, functionals, width))  # of a cell: its points mostly follow one another
+    part = zeros((d, functionals, width))  # of a cell: its points mostly follow one another
     for q in range(len(row)):
         for i in range(d):
             for m in range(functionals):

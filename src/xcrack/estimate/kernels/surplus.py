@@ -1,7 +1,6 @@
 """Residuals and blocks of the surplus functions: cubics on edges, a bubble in each triangle."""
 
-import numpy as np
-
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 
@@ -62,10 +61,15 @@ def add_functional(residual, cell, bary, side, factor, functions, sign, copy, cr
         Number of each function's copy, negative where there is none, and whose side it takes.
     gradient : (cells, 3, 2) array
     """
-    slope, part = np.empty((4, 2)), np.zeros((2, factor.shape[3], 4))
+    slope, part = empty((4, 2)), zeros((2, factor.shape[3], 4))
     for q in range(len(cell)):
-        e = cell[q]
-        if factor[q, 0, 0, 0] != 0.0 or factor[q].any():
+        e, is_used = cell[q], factor[q, 0, 0, 0] != 0.0
+        if not is_used:
+            for i in range(2):
+                for j in range(2):
+                    for m in range(factor.shape[3]):
+                        is_used = is_used or factor[q, i, j, m] != 0.0
+        if is_used:
             _slopes(bary[q], gradient[e], sign[e], slope)
             for i in range(2):
                 for m in range(factor.shape[3]):
@@ -108,8 +112,8 @@ def take_stress(  # type: ignore[no-untyped-def]
         Gradients of the displacements of each column.
     lam, mu : float
     """
-    slope, part = np.empty((4, 2)), np.zeros((2, strain.shape[3], 4))
-    P_modulus, direct_part = lam + 2.0 * mu, np.zeros((4, 3))
+    slope, part = empty((4, 2)), zeros((2, strain.shape[3], 4))
+    P_modulus, direct_part = lam + 2.0 * mu, zeros((4, 3))
     for q in range(len(cell)):
         e, w = cell[q], weight[q]
         _slopes(bary[q], gradient[e], sign[e], slope)
@@ -187,8 +191,8 @@ def take_plain_stress(  # type: ignore[no-untyped-def]
     """
     columns = coefficients.shape[2]
     P_modulus = lam + 2.0 * mu
-    stress = np.empty((columns, 3, 3))  # corner; xx, yy, xy
-    d, displaced = np.empty((6, 2)), np.empty((4, 3, 2))
+    stress = empty((columns, 3, 3))  # corner; xx, yy, xy
+    d, displaced = empty((6, 2)), empty((4, 3, 2))
     for k in range(len(cells)):
         e = cells[k]
         G, V = gradient[e], volume[e]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import zeros
 from xcrack.base.kernels.jit import kernel
 
 
@@ -97,7 +98,7 @@ def march_places(  # type: ignore[no-untyped-def]
     """
     n, n_cycles, n_points, n_shifts = len(growth_since), len(order), len(arc), values.shape[3]
     spacing = length / (n_points - 1)
-    growth, sum_of = np.zeros(n), np.zeros(n)
+    growth, sum_of = zeros(n), zeros(n)
     length_reached, cycles_elapsed, block, cycles_in_block, rows_filled = 0.0, 0.0, 0.0, 0, 1
     arc[0, :] = 0.0
     cycles[0] = 0.0

@@ -2,8 +2,7 @@
 
 import math
 
-import numpy as np
-
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 
@@ -106,8 +105,8 @@ def set_tips(value, slope, first, row, bary, side, nodes, gradient, phi, psi, is
     d = corners - 1
     k = shift.shape[1]
     values, slopes = len(value) > 0, len(slope) > 0
-    F, slope_ahead, normal = np.empty(4), np.empty(4), np.empty(4)
-    frame_slope = np.empty((4, 3))  # in 2D the last two of three components are the same
+    F, slope_ahead, normal = empty(4), empty(4), empty(4)
+    frame_slope = empty((4, 3))  # in 2D the last two of three components are the same
     for p in range(q):
         e = row[p]
         x = 0.0
@@ -217,7 +216,7 @@ def moments_at(row, bary, corners, is_linear):  # type: ignore[no-untyped-def]
     is_linear : bool
     """
     d = corners.shape[2]
-    moment = np.empty((len(row), d + 1 if is_linear else 1))
+    moment = empty((len(row), d + 1 if is_linear else 1))
     for q in range(len(row)):
         moment[q, 0] = 1.0
         if is_linear:
@@ -287,7 +286,7 @@ def solve_moments(defect, gram, tolerance):  # type: ignore[no-untyped-def]
         Share of the largest eigenvalue up to which others count as zero.
     """
     n = gram.shape[1]
-    A, V, inverse, row = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n)
+    A, V, inverse, row = empty((n, n)), empty((n, n)), empty((n, n)), empty(n)
     for p in range(len(gram)):
         total = gram[p, 0, 0] if gram[p, 0, 0] > 1e-300 else 1e-300
         for i in range(n):
@@ -444,7 +443,7 @@ def places(cell, bary, points, cells):  # type: ignore[no-untyped-def]
     bary : (q, d + 1) array
     points, cells : (n, d) and (m, d + 1) arrays
     """
-    x = np.zeros((len(cell), points.shape[1]))
+    x = zeros((len(cell), points.shape[1]))
     for q in range(len(cell)):
         for b in range(bary.shape[1]):
             node = cells[cell[q], b]

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.blas import dsyrk
 from xcrack.base.kernels.jit import kernel
 
@@ -26,14 +27,14 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
     slot : (m, n, n) array of int32
     """
     m, n = nodes.shape
-    count = np.zeros(n_nodes + 1, np.int64)
+    count = zeros(n_nodes + 1, np.int64)
     for e in range(m):
         for a in range(n):
             count[nodes[e, a] + 1] += 1
     for i in range(n_nodes):
         count[i + 1] += count[i]
-    cells_around = np.empty(count[n_nodes], np.int64)
-    place, mark = np.empty(n_nodes, np.int64), np.empty(n_nodes, np.int64)
+    cells_around = empty(count[n_nodes], np.int64)
+    place, mark = empty(n_nodes, np.int64), empty(n_nodes, np.int64)
     for i in range(n_nodes):
         place[i], mark[i] = count[i], -1
     for e in range(m):
@@ -41,7 +42,7 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
             node = nodes[e, a]
             cells_around[place[node]] = e
             place[node] += 1
-    indptr = np.zeros(n_nodes + 1, np.int32)
+    indptr = zeros(n_nodes + 1, np.int32)
     for i in range(n_nodes):
         entries = 0
         for k in range(count[i], count[i + 1]):
@@ -53,7 +54,7 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
         indptr[i + 1] = indptr[i] + entries
         place[i] = indptr[i]
     # The pattern is symmetric: nodes that go to their neighbours in turn fill sorted rows.
-    indices = np.empty(indptr[n_nodes], np.int32)
+    indices = empty(indptr[n_nodes], np.int32)
     for i in range(n_nodes):
         for k in range(count[i], count[i + 1]):
             e = cells_around[k]
@@ -63,7 +64,7 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
                     mark[node] = n_nodes + i
                     indices[place[node]] = i
                     place[node] += 1
-    slot = np.empty((m, n, n), np.int32)
+    slot = empty((m, n, n), np.int32)
     for e in range(m):
         for a in range(n):
             i = nodes[e, a]
@@ -84,7 +85,7 @@ def block_pattern(nodes, n_nodes):  # type: ignore[no-untyped-def]
 def _add_remainder(data, start, stop, slot, weight, G, remainder):  # type: ignore[no-untyped-def]
     """Add what a stiffness that is not isotropic has besides, at one point of a cell."""
     n, d = G.shape
-    half_product = np.empty((d, d, d))
+    half_product = empty((d, d, d))
     for a in range(n):
         if not start <= slot[a, 0] < stop:
             continue
@@ -131,7 +132,7 @@ def add_block_stiffness(  # type: ignore[no-untyped-def]
         Stiffness besides. None is compiled for itself: isotropic bodies pay nothing.
     """
     n, d = slot.shape[1], gradient.shape[2]
-    G = np.empty((n, d))
+    G = empty((n, d))
     P_modulus = lam + 2.0 * mu
     for e in cells:
         is_touched = False
@@ -204,7 +205,7 @@ def joined_blocks(  # type: ignore[no-untyped-def]
         Sorted, int32.
     """
     m, n, d = len(indptr) - 1, len(over_indptr) - 1, data.shape[1]
-    start = np.zeros(n * d + 1, np.int32)
+    start = zeros(n * d + 1, np.int32)
     for i in range(n):
         for a in range(d):
             count = 0
@@ -217,7 +218,7 @@ def joined_blocks(  # type: ignore[no-untyped-def]
                     for b in range(d):
                         count += over_data[k, a, b] != 0.0
             start[i * d + a + 1] = start[i * d + a] + count
-    column, value = np.empty(start[n * d], np.int32), np.empty(start[n * d])
+    column, value = empty(start[n * d], np.int32), empty(start[n * d])
     for i in range(n):
         if not chosen_rows[i]:
             continue
@@ -275,15 +276,15 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
         Sorted in each row.
     """
     m, n = functions.shape
-    count = np.zeros(n_functions + 1, np.int64)
+    count = zeros(n_functions + 1, np.int64)
     for e in range(m):
         for a in range(n):
             if functions[e, a] >= 0:
                 count[functions[e, a] + 1] += 1
     for i in range(n_functions):
         count[i + 1] += count[i]
-    cells_around = np.empty(count[n_functions], np.int64)
-    place, mark = np.empty(n_functions, np.int64), np.empty(n_functions, np.int64)
+    cells_around = empty(count[n_functions], np.int64)
+    place, mark = empty(n_functions, np.int64), empty(n_functions, np.int64)
     for i in range(n_functions):
         place[i], mark[i] = count[i], -1
     for e in range(m):
@@ -292,7 +293,7 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
             if f >= 0:
                 cells_around[place[f]] = e
                 place[f] += 1
-    indptr = np.zeros(n_functions + 1, np.int64)
+    indptr = zeros(n_functions + 1, np.int64)
     for i in range(n_functions):
         entries = 0
         for k in range(count[i], count[i + 1]):
@@ -305,7 +306,7 @@ def enriched_pattern(functions, n_functions, n_standard):  # type: ignore[no-unt
         indptr[i + 1] = indptr[i] + entries
         place[i] = indptr[i]
     # The pattern is symmetric: functions that go to their neighbours in turn fill sorted rows.
-    indices = np.empty(indptr[n_functions], np.int32)
+    indices = empty(indptr[n_functions], np.int32)
     for i in range(n_functions):
         for k in range(count[i], count[i + 1]):
             e = cells_around[k]
@@ -373,7 +374,7 @@ def _products_by_blas(begin, end, weight, gradient, place, n_active, rows, block
         for a in range(n_active):
             for i in range(d):
                 rows[at + a * d + i] = root * gradient[q, place[a], i]
-    size, factors, letter = np.empty(3, np.int32), np.empty(2), np.empty(2, np.uint8)
+    size, factors, letter = empty(3, np.int32), empty(2), empty(2, np.uint8)
     size[0], size[1], size[2] = k, end - begin, width
     factors[0], factors[1] = 1.0, 0.0
     letter[0], letter[1] = 76, 78  # L N
@@ -453,14 +454,14 @@ def add_stiffness(  # type: ignore[no-untyped-def]
     """
     m, n = functions.shape
     d = gradient.shape[2]
-    place, at = np.empty(n, np.int64), np.empty(n, np.int64)
-    block, row = np.zeros((n * d, n * d)), np.empty(n * d)
+    place, at = empty(n, np.int64), empty(n, np.int64)
+    block, row = zeros((n * d, n * d)), empty(n * d)
     for a in range(n):
         at[a] = a
     most_points = 0
     for e in range(m):
         most_points = max(most_points, offsets[e + 1] - offsets[e])
-    rows = np.empty(most_points * n * d)
+    rows = empty(most_points * n * d)
     for e in range(m):
         n_active, n_std = _set_active_places(functions[e], n_standard, place)
         begin, end = offsets[e], offsets[e + 1]
@@ -506,10 +507,10 @@ def gradient_products(offsets, weight, gradient, n_std):  # type: ignore[no-unty
         Zero where b < a.
     """
     n, d, m = gradient.shape[1], gradient.shape[2], len(offsets) - 1
-    place, row = np.empty(n, np.int64), np.empty(n * d)
+    place, row = empty(n, np.int64), empty(n * d)
     for a in range(n):
         place[a] = a
-    result = np.empty((m, n * d, n * d))
+    result = empty((m, n * d, n * d))
     for e in range(m):
         _products(offsets[e], offsets[e + 1], weight, gradient, place, n, n_std, row, result[e])
     return result
@@ -528,7 +529,7 @@ def add_products(  # type: ignore[no-untyped-def]
         As of `gradient_products`.
     """
     m, n = functions.shape
-    place = np.empty(n, np.int64)
+    place = empty(n, np.int64)
     for e in range(m):
         n_active, n_std = _set_active_places(functions[e], n_standard, place)
         block = products[e]

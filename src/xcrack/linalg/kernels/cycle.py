@@ -8,6 +8,7 @@ ones against negative values, which costs up to four times.
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 from xcrack.base.kernels.vectors import one_row, three_rows
 
@@ -31,7 +32,7 @@ def pattern_sizes(indptr, indices, first, n_columns):  # type: ignore[no-untyped
     """
     n_blocks = len(first) - 1
     mark = np.full(n_columns, -1, np.int64)
-    count = np.zeros(n_blocks, np.int64)
+    count = zeros(n_blocks, np.int64)
     for g in range(n_blocks):
         for k in range(indptr[first[g]], indptr[first[g + 1]]):
             column = indices[k]
@@ -81,7 +82,7 @@ def fill_blocks(indptr, indices, data, first, start, size, offset, n_columns, sh
         Zero; filled: full chunks of three rows column by column, then single rows.
     """
     mark = np.full(n_columns, -1, np.int64)
-    place = np.empty(n_columns, np.int64)
+    place = empty(n_columns, np.int64)
     for g in range(len(first) - 1):
         m = start[g]
         for k in range(indptr[first[g]], indptr[first[g + 1]]):

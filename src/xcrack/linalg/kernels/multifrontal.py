@@ -11,6 +11,7 @@ have other last bits.
 import numba
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.blas import dgemm, dgemv, doubles_at, dpotrf, dsyrk, dtrsm, dtrsv
 from xcrack.base.kernels.jit import kernel
 
@@ -125,8 +126,8 @@ def factor_parts(fronts, panel, update, square, is_packed, chosen_parts, low_par
     most_rows = 0
     for t in range(parts):
         most_rows = max(most_rows, begin[t + 1] - begin[t])
-    run = np.empty(most_rows + 1, np.int64)
-    size, factors, letter = np.empty(4, np.int32), np.empty(2), np.empty(4, np.uint8)
+    run = empty(most_rows + 1, np.int64)
+    size, factors, letter = empty(4, np.int32), empty(2), empty(4, np.uint8)
     factors[0], factors[1] = 1.0, -1.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82  # L N T R
     lower_letter, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
@@ -233,8 +234,8 @@ def substituted_one(first, begin, boundary, panel, x, is_forward, is_backward): 
     parts, largest_boundary = len(first) - 1, 1
     for t in range(parts):
         largest_boundary = max(largest_boundary, begin[t + 1] - begin[t])
-    B = np.empty(largest_boundary)
-    size, factors, letter = np.empty(4, np.int32), np.empty(3), np.empty(3, np.uint8)
+    B = empty(largest_boundary)
+    size, factors, letter = empty(4, np.int32), empty(3), empty(3, np.uint8)
     size[3] = 1
     factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
     letter[0], letter[1], letter[2] = 76, 78, 84  # L N T
@@ -317,7 +318,7 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
         Halves to do: L^-1 X, and L^-T of that.
     """
     parts, r = len(order), X.shape[1]
-    size, factors, letter = np.empty(4, np.int32), np.empty(3), np.empty(4, np.uint8)
+    size, factors, letter = empty(4, np.int32), empty(3), empty(4, np.uint8)
     factors[0], factors[1], factors[2] = 1.0, -1.0, 0.0
     letter[0], letter[1], letter[2], letter[3] = 76, 78, 84, 82
     lower_letter, no_transpose = letter.ctypes.data, letter.ctypes.data + 1
@@ -332,7 +333,7 @@ def substitute(first, begin, boundary, order, rank, panel, X, is_touched, is_for
     largest_boundary = 1
     for t in range(parts):
         largest_boundary = max(largest_boundary, begin[t + 1] - begin[t])
-    B = np.empty((largest_boundary, r))
+    B = empty((largest_boundary, r))
     size[0] = r
     x0, b0 = X.ctypes.data, B.ctypes.data
     if is_forward:
@@ -483,16 +484,16 @@ def bisect_cells(ranking, centre, cells, n_points, depth):  # type: ignore[no-un
         Number 0 to 2^depth - 1.
     """
     d, n = ranking.shape
-    last_cell, visit = np.empty(n_points, dtype=np.int64), np.zeros(n_points + 1, dtype=np.int64)
-    begin_of_point = np.empty(n, dtype=np.int64)
-    leaf = np.empty(n, dtype=np.int64)
-    begin, end = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    last_cell, visit = empty(n_points, dtype=np.int64), zeros(n_points + 1, dtype=np.int64)
+    begin_of_point = empty(n, dtype=np.int64)
+    leaf = empty(n, dtype=np.int64)
+    begin, end = zeros(1, dtype=np.int64), zeros(1, dtype=np.int64)
     end[0] = n
-    is_lower = np.empty(n, dtype=np.bool_)
-    buffer = np.empty(n, dtype=np.int64)
+    is_lower = empty(n, dtype=np.bool_)
+    buffer = empty(n, dtype=np.int64)
     for _ in range(depth):
         m = len(begin)
-        new_begin, new_end = np.empty(2 * m, dtype=np.int64), np.empty(2 * m, dtype=np.int64)
+        new_begin, new_end = empty(2 * m, dtype=np.int64), empty(2 * m, dtype=np.int64)
         for g in range(m):
             a, b = begin[g], end[g]
             half, axis = a + (b - a) // 2, 0
@@ -543,7 +544,7 @@ def _ancestor(a, b):  # type: ignore[no-untyped-def]
 @kernel
 def node_parts(cell_nodes, leaf, depth, n):  # type: ignore[no-untyped-def]
     """Lowest part that holds all cells of each node `(n,)`."""
-    part = np.zeros(n, dtype=np.int64)
+    part = zeros(n, dtype=np.int64)
     for c in range(len(cell_nodes)):
         leaf_number = leaf[c] + (1 << depth)
         for j in range(cell_nodes.shape[1]):
@@ -570,7 +571,7 @@ def column_parts(indptr, indices, n_columns, owner, d, part):  # type: ignore[no
     -------
     (n_columns,) array of int
     """
-    result = np.zeros(n_columns, dtype=np.int64)
+    result = zeros(n_columns, dtype=np.int64)
     for i in range(len(indptr) - 1):
         for k in range(indptr[i], indptr[i + 1]):
             result[indices[k]] = _ancestor(result[indices[k]], part[owner[i // d]])
@@ -583,9 +584,9 @@ def column_parts(indptr, indices, n_columns, owner, d, part):  # type: ignore[no
 def postorder(depth):  # type: ignore[no-untyped-def]
     """Parts in the order children before parents, and the place of each part in it."""
     count = (1 << (depth + 1)) - 1
-    order, rank = np.empty(count, dtype=np.int64), np.zeros(count + 1, dtype=np.int64)
+    order, rank = empty(count, dtype=np.int64), zeros(count + 1, dtype=np.int64)
     # The subtree of a part with h levels below it takes 2^(h + 1) - 1 places, its own last.
-    begin = np.zeros(count + 1, dtype=np.int64)
+    begin = zeros(count + 1, dtype=np.int64)
     depth_below = depth
     for p in range(1, count + 1):
         if p >= (2 << (depth - depth_below)):
@@ -644,20 +645,20 @@ def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # ty
     value : array
     """
     parts, n = len(order), len(perm)
-    start = np.zeros(n + 1, dtype=np.int64)
+    start = zeros(n + 1, dtype=np.int64)
     room = len(indices)  # twice what is needed, but no pattern is symmetric to the last zero
-    row, value = np.empty(room, dtype=np.int32), np.empty(room)
-    begin = np.zeros(parts + 1, dtype=np.int64)
+    row, value = empty(room, dtype=np.int32), empty(room)
+    begin = zeros(parts + 1, dtype=np.int64)
     capacity = 8 * n + 1000
-    boundary = np.empty(capacity, dtype=np.int32)
-    in_parent = np.empty(capacity, dtype=np.int32)
-    mark, row_in_front = np.zeros(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+    boundary = empty(capacity, dtype=np.int32)
+    in_parent = empty(capacity, dtype=np.int32)
+    mark, row_in_front = zeros(n, dtype=np.int32), empty(n, dtype=np.int32)
     to = 0
     for t in range(parts):
         first_pivot, end_pivot, top = first[t], first[t + 1], begin[t]
         if top + n > capacity:
             capacity = 2 * capacity + n
-            longer_boundary, wider_map = np.empty(capacity, np.int32), np.empty(capacity, np.int32)
+            longer_boundary, wider_map = empty(capacity, np.int32), empty(capacity, np.int32)
             for k in range(top):
                 longer_boundary[k], wider_map[k] = boundary[k], in_parent[k]
             boundary, in_parent = longer_boundary, wider_map
@@ -702,8 +703,8 @@ def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # ty
 def sizes(first, begin):  # type: ignore[no-untyped-def]
     """Entries of the panel of each part and of its update matrix, and its operations."""
     parts = len(begin) - 1
-    panel, update = np.zeros(parts, dtype=np.int64), np.zeros(parts, dtype=np.int64)
-    work = np.zeros(parts)
+    panel, update = zeros(parts, dtype=np.int64), zeros(parts, dtype=np.int64)
+    work = zeros(parts)
     for t in range(parts):
         k, b = first[t + 1] - first[t], begin[t + 1] - begin[t]
         panel[t] = (k + b) * k
@@ -715,7 +716,7 @@ def sizes(first, begin):  # type: ignore[no-untyped-def]
 @kernel
 def heights(order, rank):  # type: ignore[no-untyped-def]
     """Levels below each part `(parts,)`."""
-    height = np.zeros(len(order), dtype=np.int64)
+    height = zeros(len(order), dtype=np.int64)
     for t in range(len(order)):
         if 2 * order[t] <= len(order):
             height[t] = height[rank[2 * order[t]]] + 1
@@ -735,8 +736,8 @@ def places_of_squares(order, rank, begin, height, is_packed, level):  # type: ig
     below, above : int
         Entries that the stacks of a subtree take, and those above the subtrees.
     """
-    place = np.zeros(len(order), dtype=np.int64)
-    top, most_room = np.zeros(4, dtype=np.int64), np.zeros(4, dtype=np.int64)
+    place = zeros(len(order), dtype=np.int64)
+    top, most_room = zeros(4, dtype=np.int64), zeros(4, dtype=np.int64)
     for t in range(len(order)):
         p, h = order[t], height[t]
         stack = 2 * (h > level) + h % 2
@@ -767,7 +768,7 @@ def unchanged_parts(fronts, previous_factor):  # type: ignore[no-untyped-def]
     first, begin, in_parent, start, row, value, order, rank = fronts
     first0, begin0, in_parent0, start0, row0, value0 = previous_factor[:6]
     parts = len(order)
-    is_unchanged = np.zeros(parts, dtype=np.bool_)
+    is_unchanged = zeros(parts, dtype=np.bool_)
     for t in range(parts):
         k, b = first[t + 1] - first[t], begin[t + 1] - begin[t]
         if k != first0[t + 1] - first0[t] or b != begin0[t + 1] - begin0[t]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.blas import dgesv, dsyev
 from xcrack.base.kernels.jit import kernel
 
@@ -20,7 +21,7 @@ def times(indptr, indices, data, x):  # type: ignore[no-untyped-def]
     (n, k) array
     """
     columns = x.shape[1]
-    result = np.empty((len(indptr) - 1, columns))
+    result = empty((len(indptr) - 1, columns))
     for i in range(len(result)):
         for first in range(0, columns, 2):  # two at once, which stay in registers
             next_column = min(first + 1, columns - 1)
@@ -46,7 +47,7 @@ def times_transposed(indptr, indices, data, n_columns, x):  # type: ignore[no-un
     -------
     (m, k) array
     """
-    result = np.zeros((n_columns, x.shape[1]))
+    result = zeros((n_columns, x.shape[1]))
     for i in range(len(indptr) - 1):
         for k in range(indptr[i], indptr[i + 1]):
             for c in range(x.shape[1]):
@@ -111,13 +112,13 @@ def bordered_matrix(  # type: ignore[no-untyped-def]
     down_start, down_row, down_value = coupling_of_columns
     own_start, own_column, own_value = corner_block
     n, m = len(indptr) - 1, len(own_start) - 1
-    energy = np.zeros(m)
+    energy = zeros(m)
     for c in range(m):
         for k in range(own_start[c], own_start[c + 1]):
             if own_column[k] == c:
                 energy[c] = own_value[k]
-    number, count = np.empty(first, np.int32), 0
-    scale = np.empty(first + m)
+    number, count = empty(first, np.int32), 0
+    scale = empty(first + m)
     for i in range(first):
         energy_i = 0.0
         number[i] = -1
@@ -130,7 +131,7 @@ def bordered_matrix(  # type: ignore[no-untyped-def]
             count += 1
     for c in range(m):
         scale[count + c] = 1 / np.sqrt(energy[c])
-    start = np.zeros(count + m + 1, np.int32)
+    start = zeros(count + m + 1, np.int32)
     for i in range(first):
         if number[i] >= 0:
             entries = across_start[i + 1] - across_start[i]
@@ -146,7 +147,7 @@ def bordered_matrix(  # type: ignore[no-untyped-def]
         start[count + c + 1] = entries
     for c in range(count + m):
         start[c + 1] += start[c]
-    rows, values = np.empty(start[count + m], np.int32), np.empty(start[count + m])
+    rows, values = empty(start[count + m], np.int32), empty(start[count + m])
     for i in range(first):
         if number[i] >= 0:
             place = start[number[i]]
@@ -171,8 +172,8 @@ def bordered_matrix(  # type: ignore[no-untyped-def]
             values[place] = own_value[j] * scale[count + c] * scale[rows[place]]
             place += 1
     entries = count + len(Z_column)
-    begin = np.zeros(n + 1, np.int32)
-    column, value = np.empty(entries, np.int32), np.empty(entries)
+    begin = zeros(n + 1, np.int32)
+    column, value = empty(entries, np.int32), empty(entries)
     to = 0
     for i in range(n):
         if i < first and number[i] >= 0:
@@ -206,7 +207,7 @@ def dense_blocks(indptr, indices, data, members, offsets):  # type: ignore[no-un
     total = 0
     for b in range(n_blocks):
         total += (offsets[b + 1] - offsets[b]) ** 2
-    result = np.zeros(total)
+    result = zeros(total)
     place = np.full(len(indptr) - 1, -1, np.int64)
     start = 0
     for b in range(n_blocks):
@@ -257,18 +258,18 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
         if size > width:
             width = size
         room += size * (size - n_standard[b])
-    place = np.empty(n, np.int64)
+    place = empty(n, np.int64)
     for i in range(n):
         place[i] = -1
-    k, Z = np.empty((width, width)), np.empty(room)
-    Q, C = np.empty(width * width), np.empty(width * width)
-    ss, w, D = np.empty(width * width), np.empty(width), np.empty(width)
-    work, pivots = np.empty(34 * width + 1), np.empty(width + 1, np.int32)
-    sizes, letters = np.empty(4, np.int32), np.empty(2, np.uint8)
+    k, Z = empty((width, width)), empty(room)
+    Q, C = empty(width * width), empty(width * width)
+    ss, w, D = empty(width * width), empty(width), empty(width)
+    work, pivots = empty(34 * width + 1), empty(width + 1, np.int32)
+    sizes, letters = empty(4, np.int32), empty(2, np.uint8)
     sizes[2] = len(work)
     letters[0], letters[1] = 86, 76  # V L
     at = sizes.ctypes.data
-    start = np.zeros(n + 1, np.int32)
+    start = zeros(n + 1, np.int32)
     begin, has_failed = 0, False
     for b in range(blocks):
         first, end = offsets[b], offsets[b + 1]
@@ -328,7 +329,7 @@ def orthonormal_columns(  # type: ignore[no-untyped-def]
     for i in range(n):
         place[i] = start[i]
         start[i + 1] += start[i]
-    column, value = np.empty(start[n], np.int32), np.empty(start[n])
+    column, value = empty(start[n], np.int32), empty(start[n])
     begin, count = 0, 0
     for b in range(blocks):
         first, size = offsets[b], offsets[b + 1] - offsets[b]
@@ -361,7 +362,7 @@ def add_solved(members, start, offset, inverse, r, result):  # type: ignore[no-u
     result : (n,) array
         Changed.
     """
-    part = np.empty(len(result), result.dtype)  # no block holds more
+    part = empty(len(result), result.dtype)  # no block holds more
     for g in range(len(start) - 1):
         first, size = start[g], start[g + 1] - start[g]
         for i in range(size):

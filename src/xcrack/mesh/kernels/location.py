@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 _MARGIN = 1e-8  # share of a cell's extent: its box holds what lies in it but for round-off
@@ -77,16 +78,16 @@ def cells_in_bins(points, cells, body_box, shape):  # type: ignore[no-untyped-de
         Cells whose boxes meet a bin, growing.
     """
     d = points.shape[1]
-    origin, width = body_box[0], np.empty(d)
+    origin, width = body_box[0], empty(d)
     for j in range(d):
         width[j] = (body_box[1, j] - body_box[0, j]) / shape[j]
-    box_min, box_max = np.empty(d), np.empty(d)
-    begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
+    box_min, box_max = empty(d), empty(d)
+    begin, end = empty(d, np.int64), empty(d, np.int64)
     bins = 1
     for j in range(d):
         bins *= shape[j]
-    start = np.zeros(bins + 1, np.int64)
-    member = np.empty(0, np.int32)
+    start = zeros(bins + 1, np.int64)
+    member = empty(0, np.int32)
     for filling in range(2):
         if filling == 1:
             for k in range(bins, 0, -1):
@@ -94,7 +95,7 @@ def cells_in_bins(points, cells, body_box, shape):  # type: ignore[no-untyped-de
             start[0] = 0
             for k in range(bins):
                 start[k + 1] += start[k]
-            member = np.empty(start[bins], np.int32)
+            member = empty(start[bins], np.int32)
             for k in range(bins, 0, -1):
                 start[k] = start[k - 1]
         for e in range(len(cells)):
@@ -134,9 +135,9 @@ def locate_points(  # type: ignore[no-untyped-def]
     bary : (k, d + 1) array
     """
     d = points.shape[1]
-    cell, bary = np.empty(len(x), np.int64), np.zeros((len(x), d + 1))
-    coordinates = np.empty(d + 1)
-    begin, end = np.empty(d, np.int64), np.empty(d, np.int64)
+    cell, bary = empty(len(x), np.int64), zeros((len(x), d + 1))
+    coordinates = empty(d + 1)
+    begin, end = empty(d, np.int64), empty(d, np.int64)
     for q in range(len(x)):
         least_square, cell[q] = np.inf, -1
         _span(x[q], x[q], grid[0], grid[1], shape, begin, end)
@@ -193,10 +194,10 @@ def _from_segment(points, a, b, x):  # type: ignore[no-untyped-def]
 @kernel
 def cells_within(points, cells, x, radius):  # type: ignore[no-untyped-def]
     """Triangles one of whose sides comes nearer to a point than a radius `(k,)`, growing."""
-    box_min, box_max, box = np.empty(2), np.empty(2), np.empty((2, 2))
+    box_min, box_max, box = empty(2), empty(2), empty((2, 2))
     for j in range(2):
         box[0, j], box[1, j] = x[j] - radius, x[j] + radius
-    members, count = np.empty(len(cells), np.int64), 0
+    members, count = empty(len(cells), np.int64), 0
     for e in range(len(cells)):
         if _box_meets_bin(points, cells, e, box, box_min, box_max):
             for i in range(3):
@@ -236,11 +237,11 @@ def polyline_distance(x, vertices):  # type: ignore[no-untyped-def]
     segment : (n,) array of int
     """
     n, last_segment = len(x), len(vertices) - 2
-    phi = np.empty(n)
-    segment = np.empty(n, np.int64)
-    length = np.empty(last_segment + 1)
-    ex = np.empty(last_segment + 1)
-    ey = np.empty(last_segment + 1)
+    phi = empty(n)
+    segment = empty(n, np.int64)
+    length = empty(last_segment + 1)
+    ex = empty(last_segment + 1)
+    ey = empty(last_segment + 1)
     for s in range(last_segment + 1):
         dx = vertices[s + 1, 0] - vertices[s, 0]
         dy = vertices[s + 1, 1] - vertices[s, 1]
@@ -318,7 +319,7 @@ def nearest_vertices(x, vertices, bound):  # type: ignore[no-untyped-def]
     n, count = len(x), len(vertices)
     stretch_size = max(1, int(0.8 * math.sqrt(count)))
     stretches = (count + stretch_size - 1) // stretch_size
-    middle, reach = np.empty((stretches, 3)), np.zeros(stretches)
+    middle, reach = empty((stretches, 3)), zeros(stretches)
     for b in range(stretches):
         first, end = b * stretch_size, min(count, (b + 1) * stretch_size)
         for j in range(3):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty
 from xcrack.base.kernels.jit import kernel
 
 # Four times the barycentric coordinates of the nodes: corners, edges from their first corner on, in
@@ -161,9 +162,9 @@ def nearest_on_pieces(x, candidates, offsets, piece, node_number, nodes, centre,
     table = _OF_LINE if nodes.shape[1] == 5 else _OF_TRIANGLE
     corners, d = table.shape[1], x.shape[1]
     foot, owner = x.copy(), np.full(len(x), -1, np.int64)
-    work = (np.empty(d), np.empty((corners, d)), np.empty((corners, 5)), np.empty((corners, 5)))
-    bary, tried_pieces = np.empty(corners), np.empty(_MOST_PIECES, np.int64)
-    start = np.empty((_MOST_PIECES, corners))
+    work = (empty(d), empty((corners, d)), empty((corners, 5)), empty((corners, 5)))
+    bary, tried_pieces = empty(corners), empty(_MOST_PIECES, np.int64)
+    start = empty((_MOST_PIECES, corners))
     for q in range(len(x)):
         least_square, count = np.inf, 0
         for n in candidates[q]:
@@ -224,8 +225,8 @@ def points_of_pieces(nodes, owner, bary):  # type: ignore[no-untyped-def]
     """
     table = _OF_LINE if nodes.shape[1] == 5 else _OF_TRIANGLE
     corners, d = table.shape[1], nodes.shape[2]
-    x, tangents = np.empty((len(owner), d)), np.empty((len(owner), corners, d))
-    value, slope = np.empty((corners, 5)), np.empty((corners, 5))
+    x, tangents = empty((len(owner), d)), empty((len(owner), corners, d))
+    value, slope = empty((corners, 5)), empty((corners, 5))
     for q in range(len(owner)):
         _place(table, nodes[owner[q]], bary[q], x[q], tangents[q], value, slope)
     return x, tangents

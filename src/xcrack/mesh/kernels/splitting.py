@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 _FOOT = 1e-9  # share of a segment within which a foot at its end is the end
@@ -23,7 +24,7 @@ def _set_vertices(bary, to, point, numbers):  # type: ignore[no-untyped-def]
 @kernel
 def _corners(n):  # type: ignore[no-untyped-def]
     """Corners of a simplex in barycentric coordinates, rows 0 to 3; cut points are put below."""
-    point = np.zeros((8, n))
+    point = zeros((8, n))
     for i in range(n):
         point[i, i] = 1.0
     return point
@@ -125,10 +126,10 @@ def cut_simplices(phi, x, least_volume):  # type: ignore[no-untyped-def]
     """
     k, n = phi.shape
     capacity = n * k if n == 3 else 6 * k
-    bary, fraction = np.empty((capacity, n, n)), np.empty(capacity)
-    side, parent = np.empty(capacity, np.int64), np.empty(capacity, np.int64)
-    order, vertices = np.empty(n, np.int64), np.empty(n, np.int64)
-    t, u, point = np.empty(n), np.empty(n), _corners(n)
+    bary, fraction = empty((capacity, n, n)), empty(capacity)
+    side, parent = empty(capacity, np.int64), empty(capacity, np.int64)
+    order, vertices = empty(n, np.int64), empty(n, np.int64)
+    t, u, point = empty(n), empty(n), _corners(n)
     to = 0
     for e in range(k):
         count = _sides(phi, e, order)
@@ -212,8 +213,8 @@ def interface_simplices(phi, x):  # type: ignore[no-untyped-def]
     parent : (s,) array of int
     """
     k, n = phi.shape
-    bary, parent = np.empty((2 * k + 1, n - 1, n)), np.empty(2 * k + 1, np.int64)
-    order, vertices = np.empty(n, np.int64), np.empty(n, np.int64)
+    bary, parent = empty((2 * k + 1, n - 1, n)), empty(2 * k + 1, np.int64)
+    order, vertices = empty(n, np.int64), empty(n, np.int64)
     point, to = _corners(n), 0
     for e in range(k):
         count = _sides(phi, e, order)
@@ -260,8 +261,8 @@ def graded_points(begin, end, tips, u, w):  # type: ignore[no-untyped-def]
         Summing to the length of each segment.
     """
     k, n = len(begin), len(u)
-    number = np.empty(2 * n * k, np.int64)
-    place, weight = np.empty((2 * n * k, 2)), np.empty(2 * n * k)
+    number = empty(2 * n * k, np.int64)
+    place, weight = empty((2 * n * k, 2)), empty(2 * n * k)
     to = 0
     for s in range(k):
         x, y = end[s, 0] - begin[s, 0], end[s, 1] - begin[s, 1]
@@ -333,8 +334,8 @@ def split_segments(ends, cut, level):  # type: ignore[no-untyped-def]
         0 where phi changes its sign though no crack cuts.
     """
     cracks, k = cut.shape
-    at_cut, cuts = np.empty((k, cracks)), np.zeros(k, np.int64)
-    place = np.zeros(cracks + 2, np.int64)  # of the next part, by its rank on its edge
+    at_cut, cuts = empty((k, cracks)), zeros(k, np.int64)
+    place = zeros(cracks + 2, np.int64)  # of the next part, by its rank on its edge
     for e in range(k):
         for c in range(cracks):
             t = cut[c, e]
@@ -355,8 +356,8 @@ def split_segments(ends, cut, level):  # type: ignore[no-untyped-def]
             place[part + 1] += 1
     for part in range(cracks + 1):
         place[part + 1] += place[part]
-    number = np.empty(place[cracks + 1], np.int64)
-    bary, side = np.empty((len(number), 2, 2)), np.empty((len(number), cracks), np.int64)
+    number = empty(place[cracks + 1], np.int64)
+    bary, side = empty((len(number), 2, 2)), empty((len(number), cracks), np.int64)
     for e in range(k):
         for part in range(cuts[e] + 1):
             row = place[part]
@@ -411,7 +412,7 @@ def _with_room(table, count, n_rows):  # type: ignore[no-untyped-def]
     """A table with so many more rows than those in use, twice as long where it is too short."""
     if count + n_rows <= len(table):
         return table
-    long_table = np.empty((2 * (count + n_rows), 5))
+    long_table = empty((2 * (count + n_rows), 5))
     for q in range(count):
         for k in range(5):
             long_table[q, k] = table[q, k]
@@ -435,7 +436,7 @@ def _put_rule(table, count, number, vertex, share, bary, weight):  # type: ignor
 @kernel
 def _where_far_side_meets(circles, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     """Places 0, …, 1 on the side from a to b, increasing, between which it crosses no circle."""
-    place = np.empty(2 * len(circles) + 2)
+    place = empty(2 * len(circles) + 2)
     place[0], count = 0.0, 1
     dx, dy = bx - ax, by - ay
     square, half = dx * dx + dy * dy, ax * dx + ay * dy
@@ -582,11 +583,12 @@ def triangle_points(  # type: ignore[no-untyped-def]
     place : (q, 3) array
     weight : (q,) array
     """
-    stack, depths = np.empty((3 * levels + 4, 3, 3)), np.empty(3 * levels + 4, np.int64)
-    full_range = np.array([0.0, np.inf])
-    part, middle, corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
-    vertex, fan_vertex, fan_corner = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 2))
-    table, count = np.empty((len(bary) * len(plain_share), 5)), 0
+    stack, depths = empty((3 * levels + 4, 3, 3)), empty(3 * levels + 4, np.int64)
+    full_range = zeros(2)
+    full_range[1] = np.inf
+    part, middle, corner = empty((3, 3)), empty((3, 3)), empty((3, 2))
+    vertex, fan_vertex, fan_corner = empty((3, 3)), empty((3, 3)), empty((3, 2))
+    table, count = empty((len(bary) * len(plain_share), 5)), 0
     for k in range(len(bary)):
         if not bears_tip[k]:
             table, count = _put_rule(table, count, k, bary[k], share[k], plain_rule, plain_share)
@@ -649,7 +651,7 @@ def triangle_points(  # type: ignore[no-untyped-def]
             for i in range(4):
                 depths[top + i] = level + 1
             top += 4
-    number, place, weight = np.empty(count, np.int64), np.empty((count, 3)), np.empty(count)
+    number, place, weight = empty(count, np.int64), empty((count, 3)), empty(count)
     for q in range(count):
         number[q], weight[q] = int(table[q, 0]), table[q, 4]
         for b in range(3):
@@ -701,14 +703,14 @@ def bisected_towards_fronts(bary, x, levels, share, nearness, n_bisections, tole
     share : (q,) array
     """
     n_fronts = levels.shape[1]
-    part_bary, part_x = np.empty((n_bisections + 1, 4, 4)), np.empty((n_bisections + 1, 4, 3))
+    part_bary, part_x = empty((n_bisections + 1, 4, 4)), empty((n_bisections + 1, 4, 3))
     part_levels, depth = (
-        np.empty((n_bisections + 1, n_fronts, 4, 2)),
-        np.empty(n_bisections + 1, np.int64),
+        empty((n_bisections + 1, n_fronts, 4, 2)),
+        empty(n_bisections + 1, np.int64),
     )
-    number, count = np.empty(4 * len(share) + 16, np.int64), 0
-    result, fraction = np.empty((len(number), 4, 4)), np.empty(len(number))
-    length = np.empty(6)
+    number, count = empty(4 * len(share) + 16, np.int64), 0
+    result, fraction = empty((len(number), 4, 4)), empty(len(number))
+    length = empty(6)
     for k in range(len(share)):
         part_bary[0], part_x[0], part_levels[0], depth[0] = bary[k], x[k], levels[k], 0
         top = 0

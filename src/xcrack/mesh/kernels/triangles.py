@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 LEAF = 4  # boxes a leaf of the tree
@@ -68,9 +69,9 @@ def box_tree(low_corners, high_corners):  # type: ignore[no-untyped-def]
     """
     k = len(low_corners)
     order = np.arange(k)
-    node = np.empty((2 * k + 1, 3), np.int64)
-    box_min = np.empty((2 * k + 1, 3))
-    box_max = np.empty((2 * k + 1, 3))
+    node = empty((2 * k + 1, 3), np.int64)
+    box_min = empty((2 * k + 1, 3))
+    box_max = empty((2 * k + 1, 3))
     node[0, 1], node[0, 2] = 0, k
     n_nodes = 1
     at = 0
@@ -226,14 +227,14 @@ def closest_triangle(x, corners, normal, order, node, box_min, box_max, band, to
         Closest points.
     """
     n = len(x)
-    distance = np.empty(n)
-    triangle = np.empty(n, np.int64)
-    part = np.zeros(n, np.int64)
-    foot = np.empty((n, 3))
-    stack = np.empty(128, np.int64)
-    stack_square = np.empty(128)
-    foot_point = np.empty(3)
-    trial = np.empty(3)
+    distance = empty(n)
+    triangle = empty(n, np.int64)
+    part = zeros(n, np.int64)
+    foot = empty((n, 3))
+    stack = empty(128, np.int64)
+    stack_square = empty(128)
+    foot_point = empty(3)
+    trial = empty(3)
     for i in range(n):
         p = x[i]
         least_gap = band
@@ -300,12 +301,12 @@ def closest_segment(x, start, stop, order, node, box_min, box_max, band):  # typ
         Place of the closest point along the segment, in [0, 1].
     """
     n = len(x)
-    distance = np.empty(n)
-    segment = np.empty(n, np.int64)
-    position = np.zeros(n)
-    stack = np.empty(128, np.int64)
-    stack_square = np.empty(128)
-    foot = np.empty(3)
+    distance = empty(n)
+    segment = empty(n, np.int64)
+    position = zeros(n)
+    stack = empty(128, np.int64)
+    stack_square = empty(128)
+    foot = empty(3)
     for i in range(n):
         p = x[i]
         least_square = band * band
@@ -363,9 +364,9 @@ def crossed_triangle(start, stop, corners, normal, order, node, box_min, box_max
     """
     n = len(start)
     triangle = np.full(n, -1)
-    position = np.zeros(n)
-    stack = np.empty(128, np.int64)
-    point = np.empty(3)
+    position = zeros(n)
+    stack = empty(128, np.int64)
+    point = empty(3)
     for i in range(n):
         least_share = np.inf
         top = 0

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from xcrack.base.kernels.arrays import empty, zeros
 from xcrack.base.kernels.jit import kernel
 
 
@@ -23,7 +24,7 @@ def cells_between(points, cells, size, centre, inner_radius, radius):  # type: i
         farther than its size outside `radius`.
     """
     corners, d = cells.shape[1], points.shape[1]
-    ring_cells = np.empty(len(cells), np.int64)
+    ring_cells = empty(len(cells), np.int64)
     count = 0
     for e in range(len(cells)):
         farthest_square, square_of_point = 0.0, 0.0
@@ -234,8 +235,8 @@ def add_points(  # type: ignore[no-untyped-def]
         Stiffness less that of the tip, in the frame, by strains and shear angle. With it points
         within the inner radius count too. None is compiled for itself.
     """
-    g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
-    du, bend = np.empty((2, 2, total.shape[0])), np.empty((3, 2, 2))
+    g, sigma, fall = empty((3, 2, 2)), empty((3, 2, 2)), empty(len(radii))
+    du, bend = empty((2, 2, total.shape[0])), empty((3, 2, 2))
     largest_radius, least_radius = radii[0], r_inner[0]
     for k in range(1, len(radii)):
         largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, r_inner[k])
@@ -293,9 +294,9 @@ def add_plain_cells(  # type: ignore[no-untyped-def]
         Points of a cell and their share of its volume.
     """
     states = total.shape[0]
-    g, sigma, fall = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty(len(radii))
-    gradient, corner = np.empty((2, 2, states)), np.empty((3, 2, 2, states))
-    du, bend = np.empty((2, 2, states)), np.empty((3, 2, 2))
+    g, sigma, fall = empty((3, 2, 2)), empty((3, 2, 2)), empty(len(radii))
+    gradient, corner = empty((2, 2, states)), empty((3, 2, 2, states))
+    du, bend = empty((2, 2, states)), empty((3, 2, 2))
     largest_radius, least_radius = radii[0], r_inner[0]
     for k in range(1, len(radii)):
         largest_radius, least_radius = max(largest_radius, radii[k]), min(least_radius, r_inner[k])
@@ -379,10 +380,10 @@ def add_lips(  # type: ignore[no-untyped-def]
     steady : (s, 2, 2) array
         Initial stress at the tip in its frame.
     """
-    g, sigma, no_turn = np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.zeros((2, 2))
+    g, sigma, no_turn = empty((3, 2, 2)), empty((3, 2, 2)), zeros((2, 2))
     no_turn[0, 0] = no_turn[1, 1] = 1.0
     states, n = total.shape[0], len(xi)
-    du = np.empty((2, 2, states))
+    du = empty((2, 2, states))
     for p in range(n):
         for face in range(2):
             sign = 1.0 - 2.0 * face
