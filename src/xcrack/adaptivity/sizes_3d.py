@@ -34,6 +34,7 @@ _BAR, _RISE, _COARSEST = 0.00756, 1.255, 3.0
 _LEAST, _MOST = 1.5, 2.0  # times finer in a round: what less changes is no bar
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
 _BEND = 0.6  # of the radius of curvature of a front: the domains of K have to fit into it
+_COARSE_BEND = 2.0  # times that, where the tolerance lets cells be larger
 _SHARPEST = 0.4  # of the cells along a front: least where it turns
 _OPEN = 1.5  # error of K beside a free surface over the bar of two domains (measured)
 _SMALLER = 1.3  # times finer that cells are at least where 1.5 was asked for
@@ -181,19 +182,18 @@ def _shorten_errors(sif: SIF, previous_sif: SIF, is_finer: bool) -> SIF:
 
 def _first_sizes(problem: Problem, coarseness: float = 1.0) -> tuple[list[Floats], list[Floats]]:
     """Places along the fronts of each crack, and the longest edges of the first mesh there."""
-    places, sizes = [], []
+    places, sizes, coarse_sizes = [], [], []
     for crack in problem.placed:
         size = first_size(crack, problem.mesh)
         lines = [crack.points[front] for front in crack.fronts or ()]
         bend = np.maximum(_BEND * radii(lines, CELLS * size), _SHARPEST * size)
         places.append(points_between(lines))
         sizes.append(np.minimum(size, bend))
+        coarse_sizes.append(np.minimum(coarseness * sizes[-1], _COARSE_BEND * bend))
     # Where cracks are near each other cells stay small all along: sizes that differ much within
     # the reach of the tip functions leave a matrix that is not positive.
-    sizes_in_room = with_room(places, [coarseness * size for size in sizes])
-    is_alone = [
-        np.array_equal(a, coarseness * b) for a, b in zip(sizes_in_room, sizes, strict=True)
-    ]
+    sizes_in_room = with_room(places, coarse_sizes)
+    is_alone = [np.array_equal(a, b) for a, b in zip(sizes_in_room, coarse_sizes, strict=True)]
     return places, [
         a if is_alone_here else b
         for a, b, is_alone_here in zip(
