@@ -101,18 +101,20 @@ def run(problem: xc.Problem, end: float, **options: Any) -> tuple[xc.History, fl
         return xc.collect(steps, until=there, keep_solutions=False), process_time() - start
 
 
-def against(truth: xc.History) -> Callable[[xc.History], tuple[float, float]]:
-    """Errors of path, over the length grown, and of life of a run, where its last tip is."""
+def against(truth: xc.History, c: int = 0) -> Callable[[xc.History], tuple[float, float]]:
+    """Errors of path, over the length grown, and of life of a run, where the last tip of c is."""
     solved = [step for step in truth.steps if step.n_tips]
-    x = np.array([step.corrected[0].points[-1] for step in solved])
+    x = np.array([step.corrected[c].points[-1] for step in solved])
+    moved = np.append(True, np.linalg.norm(np.diff(x, axis=0), axis=1) > 0)  # a tip may wait
+    x, cycles = x[moved], np.array([step.cycles for step in solved])[moved]
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
-    curve = CubicSpline(s, np.column_stack([x, [step.cycles for step in solved]]))
+    curve = CubicSpline(s, np.column_stack([x, cycles]))
     fine = np.linspace(0.0, s[-1], 20001)
     way: Floats = curve(fine)
 
     def errors(history: xc.History) -> tuple[float, float]:
         last = [step for step in history.steps if step.n_tips][-1]
-        away = np.linalg.norm(way[:, :2] - last.corrected[0].points[-1], axis=1)
+        away = np.linalg.norm(way[:, :2] - last.corrected[c].points[-1], axis=1)
         near = int(np.argmin(away))
         return float(away[near] / fine[near]), abs(float(last.cycles / way[near, 2] - 1))
 

@@ -7,9 +7,14 @@ import pytest
 from scipy.integrate import quad
 
 import xcrack as xc
+from benchmarks.wanted_drawn import errors_beside
+from benchmarks.wanted_drawn import run as run_drawn
+from benchmarks.wanted_drawn import scene as drawn_scene
 from benchmarks.wanted_error import SCENES, against, run, scene
 from xcrack import respond
+from xcrack.analysis.solve import solve_states
 from xcrack.growth import cells as mesh_cells
+from xcrack.growth import response
 from xcrack.growth.options import run_of as rule_of
 from xcrack.growth.step_length import first_length, next_length, step_error
 from xcrack.mesh.locate import cell_sizes
@@ -275,22 +280,50 @@ def test_bars_between_solves_are_foretold(tmp_path):
     """Best K is that of own bars within the bars; a run that was at its end goes on alike."""
     asked = []
 
-    def response(problem, states, reuse, bars):
+    def answer(problem, states, reuse, bars):
         asked.append(bars)
         return respond(problem, states, reuse, bars)
 
     given = run_of(strip(12), tolerance=0.05, da=0.03)
-    steps = list(xc.grow(**given, max_steps=10, response=response))
+    steps = list(xc.grow(**given, max_steps=10, response=answer))
     # The first, the fourth, the eighth and the last one have their own.
-    assert asked == [True, True, True, False, True, False, False, False, True, True]
-    for step in [steps[3], *steps[5:8]]:
+    assert asked == [True, False, False, False, True, False, False, False, True, True]
+    for step in [*steps[1:4], *steps[5:8]]:
         foretold, own = step.sif[-1][0], xc.stress_intensity(step.solutions[-1], error=True)
         assert (np.abs(foretold.best - own.best) <= foretold.bar).all()
-        assert foretold.bar[0, 0] < 4 * own.bar[0, 0]  # 1.3 a solve, and what bars change in three
+        # 1.3 a solve and a quarter of eta, which is five bars here, and what bars change in three.
+        assert foretold.bar[0, 0] < 10 * own.bar[0, 0]
     whole = xc.collect(xc.grow(**given, max_steps=8), tmp_path / "whole")
     xc.collect(xc.grow(**given, max_steps=6), tmp_path / "part")
     again = xc.resume(tmp_path / "part", **given, max_steps=8)
     assert again.table().tobytes() == whole.table().tobytes()
+
+
+def test_a_solve_whose_bars_cannot_be_foretold_is_not_done_again(monkeypatch):
+    """K of this crack doubles in a step towards the side: its bars come from the factor at hand."""
+    counts = []
+
+    def counted(*args, **options):
+        counts.append(options["error"])
+        return solve_states(*args, **options)
+
+    monkeypatch.setattr(response, "solve_states", counted)
+    problem, end = scene(SCENES[0])
+    history, _ = run(problem, end, tolerance=3e-2)
+    assert len(counts) == len(history.steps)  # no step of it turns out too long
+
+
+@pytest.mark.slow
+@pytest.mark.mission
+def test_life_of_a_pair_whose_first_step_no_later_one_may_mend_alone():
+    """Against steps of .03. A second step of an eighth of the first had mended that by 10 %."""
+    drawn = drawn_scene(3)
+    truth, _ = run_drawn(drawn, drawn.way + 0.2, tolerance=5e-4, da=0.03)
+    history, _ = run_drawn(drawn, drawn.way, tolerance=3e-2)
+    path, life = errors_beside(truth, history)
+    print(f"path {path:.1e}, life {life:.1e}")
+    assert path <= 3e-2
+    assert life <= 3e-2
 
 
 def test_another_tolerance_is_another_run(tmp_path):

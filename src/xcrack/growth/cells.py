@@ -26,10 +26,12 @@ from xcrack.crack.crack import kink_numbers
 from xcrack.crack.measures import exit_ahead
 from xcrack.crack.meetings import LEAST
 from xcrack.fatigue.checks import law_exponent
+from xcrack.fatigue.criteria import START
 from xcrack.fatigue.cycle import Cycle
 from xcrack.growth.options import GrowthRule
+from xcrack.growth.response import KnownBars
 from xcrack.growth.stations import CellSizes
-from xcrack.growth.step import RunState, Step, plan_of, run_state, solves_of
+from xcrack.growth.step import RunState, Step, StepError, plan_of, run_state, solves_of
 from xcrack.growth.step_length import (
     PATH,
     REJECTED,
@@ -39,7 +41,7 @@ from xcrack.growth.step_length import (
     next_length,
 )
 from xcrack.growth.tips import LONGER_FIRST
-from xcrack.growth.uncertainty import TOGETHER
+from xcrack.growth.uncertainty import TOGETHER, foretold_bars
 from xcrack.mesh.locate import cell_sizes
 from xcrack.mesh.mesh import Mesh
 from xcrack.mesh.refinement import graded_sizes, growing_sizes, refine
@@ -99,7 +101,7 @@ def follow(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> GrowthRule:
         On the mesh that it begins with, and on that of the last step.
     step : Step
     """
-    cells = rule.cells or CellSizes.none(rule.problem.mesh.dim)
+    cells = rule.cells or CellSizes.without_places(rule.problem.mesh.dim)
     longest_cell = np.inf if rule.da is None else rule.da / (_ROOM * LEAST)
     if not cells.moves.any() and longest_cell == np.inf:
         return rule
@@ -144,8 +146,7 @@ def refine_cells(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> Growth
     dimension, start = _MESHES[rule.problem.mesh.dim], perf_counter()
     most_unknowns = rule.max_unknowns or _MOST_UNKNOWNS
     tolerance = float(rule.tolerance or 0.0)
-    exponent = law_exponent(rule.law, np.concatenate(step.dK_eq), np.concatenate(step.R))
-    target = SHARE / TOGETHER * tolerance / max(exponent, _LEAST_EXPONENT)
+    target = SHARE / TOGETHER * tolerance / _exponent(rule, step)
     meshes = rule.meshes + 1
     for number in range(dimension.rounds):
         indicators = _bars_of_cracks(rule, step)
@@ -175,6 +176,12 @@ def refine_cells(first_rule: GrowthRule, rule: GrowthRule, step: Step) -> Growth
         if error <= _FORETOLD * target or n_cells_after == n_cells_before:
             break
     return replace(rule, meshes=meshes)
+
+
+def _exponent(rule: GrowthRule, step: Step) -> float:
+    """Exponent of the law at the ranges of a step, and no less than the least."""
+    exponent = law_exponent(rule.law, np.concatenate(step.dK_eq), np.concatenate(step.R))
+    return float(max(exponent, _LEAST_EXPONENT))
 
 
 def _bars_of_cracks(rule: GrowthRule, step: Step) -> Indicators | None:
@@ -229,7 +236,7 @@ def _cells_2d(cells: CellSizes | None, indicators: Indicators, target: float) ->
     cells_that_stay = CellSizes(
         centre[is_staying], target_size[is_staying], np.zeros(int(is_staying.sum()), dtype=bool)
     )
-    return (cells or CellSizes.none(2)).with_places(cells_that_stay).with_ends(tips, size)
+    return (cells or CellSizes.without_places(2)).with_places(cells_that_stay).with_ends(tips, size)
 
 
 _POWER = 2.5  # of the cells' size with which bars fall at order 2, on graded meshes (measured)
@@ -252,7 +259,7 @@ def _cells_3d(cells: CellSizes | None, indicators: Indicators, target: float) ->
         is_of_crack = stations.crack == crack
         size[is_of_crack] = np.median(size[is_of_crack])
     size /= np.clip(excess, 1.0, _FINER**_POWER) ** (1 / _POWER)
-    return (cells or CellSizes.none(3)).with_ends(stations.x, size)
+    return (cells or CellSizes.without_places(3)).with_ends(stations.x, size)
 
 
 @dataclass(frozen=True)
@@ -282,6 +289,10 @@ _WHOLE = 1.0  # of the tolerance, by all sources: below that no finer mesh is wo
 # err for the first step only.
 _BEGIN, _BEGIN_OF_PATH = 1.5, 3.0
 _SHORT_OF_PATH = 0.5  # of the tolerance: by K alone
+# A step in 2D whose own error is too large stays as it is where life and path are well within the
+# tolerance all the same, if that error is not many times what was wanted.
+_WELL_WITHIN, _TOLERABLE = 0.9, 5.0
+_SECOND = 0.5  # of the first step: a parabola through nearer solves mends its cycles no more
 _LAST = 0.1  # of the cycles so far: what the rest may take at the present rate
 _SHORT = 1.3  # times a first step: the shortest that cells at kinks may allow
 
@@ -304,7 +315,7 @@ def plan_again(
     new_rule = _finer_at_kinks(first_rule, rule, step) if last_step is None else None
     if new_rule is not None:
         return new_rule, None
-    shorter_step = None if last_step is None else _step_before(last_step, step)
+    shorter_step = None if last_step is None else _step_before(rule, last_step, step)
     if shorter_step is not None:  # what the mesh leaves to be wished is seen on a step that stays
         return rule, shorter_step
     if not _is_mesh_too_coarse(rule, last_step, step):
@@ -319,7 +330,15 @@ def plan_again(
     return new_rule, last_step if last_step is None else _with_room(rule, new_rule, last_step, step)
 
 
-def _step_before(last_step: Step, step: Step) -> Step | None:
+def _is_within_tolerance(rule: GrowthRule, step: Step) -> bool:
+    """Whether life and path are well within the tolerance at a step, by all sources so far."""
+    error, limit = step.error, _WELL_WITHIN * float(rule.tolerance or 0.0)
+    if error is None or not error.grown > 0:
+        return False
+    return bool(error.life <= limit * step.cycles and error.path <= limit * error.grown)
+
+
+def _step_before(rule: GrowthRule, last_step: Step, step: Step) -> Step | None:
     """The step before one whose error is too large, with a shorter way ahead; None if that is not.
 
     It follows from what is stored with both: a run that is taken up again does the same.
@@ -327,8 +346,21 @@ def _step_before(last_step: Step, step: Step) -> Step | None:
     error, control = step.control.error, last_step.control
     if error is None or error <= REJECTED or not control.can_shorten:
         return None
-    length = next_length(control.length, error, None, control.least)
+    if rule.problem.mesh.dim == 2 and error <= _TOLERABLE and _is_within_tolerance(rule, step):
+        return None
+    least_length = max(control.least, _second_length(rule, last_step))
+    length = next_length(control.length, error, None, least_length)
+    if length >= control.length:
+        return None
     return replace(last_step, control=replace(control, length=length))
+
+
+def _second_length(rule: GrowthRule, step: Step) -> float:
+    """Shortest step after the first one of all tips, length; 0 after others."""
+    solves = solves_of(step)[1]
+    if rule.problem.mesh.dim == 3 or solves.n_solves != 2:
+        return 0.0
+    return _SECOND * float(solves.sigma[1] - solves.sigma[0])
 
 
 def _ends_soon(rule: GrowthRule, step: Step) -> bool:
@@ -417,13 +449,15 @@ def _is_mesh_too_coarse(rule: GrowthRule, last_step: Step | None, step: Step) ->
     )
 
 
-_FIRST, _MEASURED = 3, 4  # solves with bars of their own: the first ones, and each of so many
-_MARGIN = 0.5  # of what K may take of a tolerance: bars that are foretold may be wrong
+_MEASURED = 4  # solves: each of so many has bars of its own
+_MARGIN = 0.8  # of what K may take of a tolerance: bars that are foretold may be wrong
+_PASSING = 2.0  # times that, in a step of few cycles
+_OF_TURN = 2.0  # times K_II over K_I: the angle by which a crack turns
 _STRAIGHT = 0.2  # rad, most that a path turns by on the way to a solve with foretold bars
 
 
-def bars_are_foretold(rule: GrowthRule, step: Step) -> bool:
-    """Whether the bars of K at the next solve may follow from those of the last one.
+def known_bars(rule: GrowthRule, step: Step) -> KnownBars | None:
+    """Bars of K at the next solve, as they follow from those of the last one; None: from its own.
 
     In 2D under a cycle, between solves that have their own: where these leave a margin, the mesh
     stays, and the path is smooth. It follows from what is stored with the step: a run that is
@@ -431,20 +465,45 @@ def bars_are_foretold(rule: GrowthRule, step: Step) -> bool:
     """
     error, index = step.error, step.index + 1
     if error is None or rule.problem.mesh.dim == 3:
-        return False
-    if index < _FIRST or index % _MEASURED == 0 or run_state(step).meshes != rule.meshes:
-        return False
+        return None
+    if index % _MEASURED == 0 or run_state(step).meshes != rule.meshes:
+        return None
     if not isinstance(rule.cycle, Cycle) or rule.load_program is not None or step.joins:
-        return False
+        return None
     plan = plan_of(step)
     if plan.joins or any(crack.ends_on for crack in plan.cracks):
-        return False
+        return None
     max_angle = max((float(np.abs(angle).max(initial=0.0)) for angle in step.angle), default=0.0)
-    if max_angle > _STRAIGHT or not np.isfinite(error.rate):
-        return False
-    allowance = _MARGIN * float(rule.tolerance or 0.0)
-    rate, turn = _errors_of_step(step)
-    return rate <= SHARE * allowance and turn <= (1 - PATH) * allowance
+    is_behind_kink = step.index == 0 and max_angle > START
+    if not np.isfinite(error.rate) or (max_angle > _STRAIGHT and not is_behind_kink):
+        return None
+    widths = _widest_bars(rule, step, error)
+    if foretold_bars(step.sif, step.sif, widths, is_behind_kink) is None:
+        return None  # not even at the same K
+    return lambda sif: foretold_bars(step.sif, sif, widths, is_behind_kink)
+
+
+def _widest_bars(rule: GrowthRule, step: Step, error: StepError) -> tuple[float, float]:
+    """Half-widths of K_I and K_II at the next solve, over the largest K, that life and path bear.
+
+    With them, and those of before, K takes no more of the whole than a margin lets it.
+    """
+    plan, tolerance = plan_of(step), float(rule.tolerance or 0.0)
+    way = float(plan.arc.max(initial=0.0))
+
+    def largest_error(
+        share: float, total: float, spent: float, part: float, error_now: float
+    ) -> float:
+        unspent = _MARGIN * share * tolerance * total - spent
+        bound = 2 * unspent / part - error_now if part > 0 else 0.0
+        return float(np.clip(bound, 0.0, _PASSING * share * tolerance))
+
+    spent_cycles = (error.K + error.contact) / TOGETHER
+    rate_error = largest_error(
+        SHARE / TOGETHER, step.cycles + plan.cycles, spent_cycles, plan.cycles, error.rate
+    )
+    turn = largest_error(1 - PATH, error.grown + way, error.K_place, way, error.turn)
+    return rate_error / _exponent(rule, step), turn / _OF_TURN
 
 
 def _errors_of_step(step: Step) -> tuple[float, float]:
@@ -476,10 +535,10 @@ def _with_room(rule: GrowthRule, new_rule: GrowthRule, last_step: Step, step: St
 __all__ = [
     "SHARE",
     "at_step",
-    "bars_are_foretold",
     "begin",
     "bisect_mesh",
     "follow",
+    "known_bars",
     "plan_again",
     "refine_cells",
 ]

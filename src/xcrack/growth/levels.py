@@ -15,7 +15,7 @@ from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.response import Response, checked_response, respond
+from xcrack.growth.response import KnownBars, Response, checked_response, respond
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem
 from xcrack.sif.sif import SIF
@@ -293,10 +293,11 @@ def respond_to_states(
     reuse: SolverState,
     bars: bool = False,
     load_factor: float = 1.0,
+    known_bars: KnownBars | None = None,
 ) -> Response:
     """Response of a scene to all load states of a run; to the levels of a spectrum of factors.
 
-    With a factor on its loads its states are named as without.
+    With a factor on its loads its states are named as without. `known_bars` as of `respond`.
     """
     spectrum = rule.cycle if isinstance(rule.cycle, Spectrum) else None
 
@@ -310,12 +311,11 @@ def respond_to_states(
                 for state in names
             ]
         if rule.response is None:
-            response = respond(problem, states, reuse, bars, solver=rule.solver)
-        else:
-            result = call_function(
-                rule.response, "the response of a step", problem, tuple(states), reuse, bars
+            response = respond(
+                problem, states, reuse, bars, solver=rule.solver, known_bars=known_bars
             )
-            response = checked_response(result, problem, states)
+        else:
+            response = _from_elsewhere(rule, problem, states, reuse, bars, known_bars)
         if load_factor != 1:
             response = replace(response, states=tuple(names), load_factor=load_factor)
         if spectrum is not None and response.solutions:
@@ -325,6 +325,31 @@ def respond_to_states(
     if spectrum is not None and spectrum.states is None:
         return respond_to_levels(problem, spectrum, solve, reuse)
     return solve(rule.cycle.load_states, reuse)
+
+
+def _from_elsewhere(
+    rule: GrowthRule,
+    problem: Problem,
+    states: Sequence[Any],
+    reuse: SolverState,
+    bars: bool,
+    known_bars: KnownBars | None,
+) -> Response:
+    """What the function of a user for K returns; it is asked for bars where none are known."""
+
+    def response_with(bars: bool) -> Response:
+        assert rule.response is not None
+        result = call_function(
+            rule.response, "the response of a step", problem, tuple(states), reuse, bars
+        )
+        return checked_response(result, problem, states)
+
+    if bars and known_bars is not None:
+        response = response_with(False)
+        sif = known_bars(response.sif)
+        if sif is not None:
+            return replace(response, sif=sif, has_known_bars=True)
+    return response_with(bars)
 
 
 def respond_under_program(

@@ -5,6 +5,7 @@ that solves. Another one takes K from a handbook, a table or a test.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -23,7 +24,7 @@ from xcrack.base.checks import (
     numbers,
     value_text,
 )
-from xcrack.base.errors import ProblemError
+from xcrack.base.errors import ProblemError, collected_warnings, warn
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem, check_problem
 from xcrack.sif.sif import SIF
@@ -58,6 +59,8 @@ class Response:
         What the next solve starts from.
     load_factor : float
         On the loads beside that of a state, where they change as the crack grows.
+    has_known_bars : bool
+        Whether the bars of K are those that were known beforehand, see `respond`.
 
     Raises
     ------
@@ -70,6 +73,7 @@ class Response:
     solutions: tuple[Solution, ...] = ()
     reuse: SolverState = field(default_factory=SolverState)
     load_factor: float = 1.0
+    has_known_bars: bool = False
 
     def __post_init__(self) -> None:
         sif = tuple(entries(row, "Response: sif") for row in entries(self.sif, "Response: sif"))
@@ -176,6 +180,8 @@ class Response:
 
 
 Respond = Callable[[Problem, Sequence[Any], SolverState, bool], Response]
+# K of all states and cracks with bars that are known already; None where they must be found.
+KnownBars = Callable[[Answers], Answers | None]
 
 
 def respond(
@@ -185,6 +191,7 @@ def respond(
     bars: bool = False,
     *,
     solver: Any = None,
+    known_bars: KnownBars | None = None,
 ) -> Response:
     """Solve a scene in some load states, and take K of all cracks.
 
@@ -199,6 +206,9 @@ def respond(
         Give K its error bars.
     solver : optional
         As of `solve`.
+    known_bars : callable (sif) -> sif or None, optional
+        With `bars`: asked first, for K of all states and cracks with bars known beforehand. Where
+        it returns None they are found, by the factor of this solve.
 
     Returns
     -------
@@ -225,13 +235,28 @@ def respond(
         problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
     )
     handed_on = new_solutions[0].reuse
-    by_crack = [stress_intensities(new_solutions, c, bars) for c in range(len(problem.cracks))]
+    asks_first = bars and known_bars is not None
+    messages: list[str] = []
+    with collected_warnings(messages) if asks_first else nullcontext():
+        by_crack = [
+            stress_intensities(new_solutions, c, bars and not asks_first)
+            for c in range(len(problem.cracks))
+        ]
+    sif = tuple(zip(*by_crack, strict=True))
+    sif_with_bars = known_bars(sif) if bars and known_bars is not None else None
+    if sif_with_bars is not None:
+        sif = sif_with_bars
+        for message in messages:
+            warn(message)
+    elif asks_first:
+        by_crack = [stress_intensities(new_solutions, c, True) for c in range(len(by_crack))]
+        sif = tuple(zip(*by_crack, strict=True))
     light = handed_on.without_factor()
     solutions = tuple(copy_without_checks(s, reuse=light, factored=None) for s in new_solutions)
-    sif = tuple(zip(*by_crack, strict=True))
     return build_without_checks(
-        Response, states=states, sif=sif, solutions=solutions, reuse=handed_on
-    )
+        Response, states=states, sif=sif, solutions=solutions, reuse=handed_on,
+        has_known_bars=sif_with_bars is not None,
+    )  # fmt: skip
 
 
 def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> Response:
@@ -256,4 +281,4 @@ def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> 
     return response
 
 
-__all__ = ["Answers", "Respond", "Response", "best_K", "checked_response", "respond"]
+__all__ = ["Answers", "KnownBars", "Respond", "Response", "best_K", "checked_response", "respond"]

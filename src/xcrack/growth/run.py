@@ -19,7 +19,7 @@ from xcrack.fatigue.law import Law, LawSets
 from xcrack.fatigue.spectrum import Spectrum
 from xcrack.growth import euler, fronts, joins_3d, tips
 from xcrack.growth.alarms import alarm_of_energy, alarm_of_life, judged_step
-from xcrack.growth.cells import at_step, bars_are_foretold, begin, follow, plan_again
+from xcrack.growth.cells import at_step, begin, follow, known_bars, plan_again
 from xcrack.growth.ends import (
     beyond_end,
     cannot_go_on,
@@ -64,7 +64,7 @@ from xcrack.growth.step import (
     run_state,
     solves_of,
 )
-from xcrack.growth.uncertainty import add_K_error, foretold_bars, shortfall
+from xcrack.growth.uncertainty import add_K_error, shortfall
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import Problem, problem_with_cracks
 from xcrack.sif.sif import SIF
@@ -584,20 +584,16 @@ def _solved_step(
 
     With `may_foretell`, bars of K may be those of the last solve, a little wider.
     """
-    is_foretold = False
-    may_foretell = may_foretell and rule.estimates and not joins_of_step
-    if may_foretell and last_step is not None and bars_are_foretold(rule, last_step):
+    bars_ahead = None
+    if may_foretell and rule.estimates and not joins_of_step and last_step is not None:
+        bars_ahead = known_bars(rule, last_step)
+    if bars_ahead is not None and last_step is not None:
         if rule.max_steps is not None and last_step.index + 2 >= rule.max_steps:
             # The last step has bars of its own; of a run that goes on it is one among others.
             step, handed_on = _solved_step(rule, problem, last_step, reuse, joins_of_step, False)
             return _with_mark(step), handed_on
-        response = respond_to_states(rule, problem, reuse)
-        with_bars = foretold_bars(last_step.sif, response.sif)
-        if with_bars is None:
-            return _solved_step(rule, problem, last_step, response.reuse, joins_of_step, False)
-        response, is_foretold = replace(response, sif=with_bars), True
-    elif rule.load_program is None:
-        response = respond_to_states(rule, problem, reuse, rule.estimates)
+    if rule.load_program is None:
+        response = respond_to_states(rule, problem, reuse, rule.estimates, known_bars=bars_ahead)
     else:
         N = 0.0 if last_step is None else last_step.cycles + plan_of(last_step).cycles
         response = respond_under_program(rule, problem, reuse, rule.estimates, N)
@@ -625,7 +621,7 @@ def _solved_step(
             rates = rates_of(rule, problem, copy_without_checks(response, sif=best_K(sif)))
             result = correct(rule, last_step, rates, identities)
     if rule.estimates:
-        result = add_K_error(rule, last_step, result, rates, sif, is_foretold)
+        result = add_K_error(rule, last_step, result, rates, sif)
     states, levels = states_and_levels(rule.cycle, response)
     step = build_without_checks(
         Step,
@@ -663,7 +659,7 @@ def _solved_step(
         ),
     )
     step = _with_plan(rule, step)
-    if is_foretold and (step.plan is None or step.plan.limit or end_of_run(rule, step)):
+    if response.has_known_bars and (step.plan is None or step.plan.limit or end_of_run(rule, step)):
         step, handed_on = _solved_step(rule, problem, last_step, handed_on, joins_of_step, False)
         return _with_mark(step), handed_on
     da = integrator.advance_of(step, plan_of(step), rates)

@@ -219,7 +219,7 @@ class CellSizes:
     moves: Bools
 
     @classmethod
-    def none(cls, dim: int) -> "CellSizes":
+    def without_places(cls, dim: int) -> "CellSizes":
         """No places."""
         return cls(np.zeros((0, dim)), np.zeros(0), np.zeros(0, dtype=bool))
 

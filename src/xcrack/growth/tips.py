@@ -452,6 +452,10 @@ LONGER_FIRST = 1.5  # times a first step of which no later one mends the cycles
 _RATIOS, _RATIOS_OF_PLACE = (0.1, 1.0), (0.5, 3.0)
 _RATIO_OF_FIRST, _OF_SECOND = 0.9, 0.5  # of cycles of the first two steps, of the second alone
 _RATIO_OF_PROLONGED = 0.25  # a parabola behind the first step errs more in it than its own
+# Of what the parabola says beside the line, in the steps of a tolerance, which are few and long:
+# what the cycles of the first one are mended by, and what is not known. All of it is too much
+# behind kinks and where cracks pull at each other, though right for single ones that grow straight.
+_MENDS_OF_FEW, _LEAST_OF_FIRST = 0.5, 0.3
 _ASTRAY = 1.0  # of what a face turns by, as the one before it was turned: growth of errors of paths
 _OF_GAP = 0.08  # of a correction: as K was solved where the tip is not
 
@@ -855,10 +859,11 @@ def _cycles(
         return growth.cycles, _better_known(rule, step, spans, line_error)
     if old_solves.sigma[0] > 0:  # the step before has passed an interface
         return growth.cycles, _CyclesError(line_error, 0.0, line_error)
-    # The second step: the parabola tells what the first one, along a line, was off.
+    # The second step: the parabola tells what the first one, along a line, was off, less or more.
     line, curve = (span.arcs()[1] for span in spans.of_step_before[1:])
     line_and_curve_error = _RATIO_OF_FIRST * (line_error + share * abs(curve - line))
-    return growth.cycles + curve - line, _CyclesError(
+    part = 1.0 if rule.tolerance is None else _MENDS_OF_FEW
+    return growth.cycles + part * (curve - line), _CyclesError(
         _OF_SECOND * line_error, 0.0, line_and_curve_error
     )
 
@@ -896,7 +901,10 @@ def _better_known(rule: GrowthRule, step: Step, spans: _Spans, line_error: float
             _RATIO_OF_PROLONGED * abs(by_solves_then - by_solves_now),
             abs(by_solves_then - by_last_two),
         )
-        error_now += min(prolonged_error, _RATIO_OF_FIRST * share * error_before)
+        error_of_first = min(prolonged_error, _RATIO_OF_FIRST * share * error_before)
+        if rule.tolerance is not None:
+            error_of_first = max(error_of_first, _LEAST_OF_FIRST * error_before)
+        error_now += error_of_first
     return _CyclesError(newest_error, error_now, newest_error)
 
 

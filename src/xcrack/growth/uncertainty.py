@@ -90,13 +90,18 @@ def rate_error(rule: GrowthRule, rates: Rates, sif: Answers) -> RateError:
 
 
 # Bars that are foretold from those of the solve before. On a mesh that stays eta keeps its share of
-# K to a quarter from step to step, and bars become shorter behind a kink (measured).
+# K to a half or so from step to step where there is room around the tips; bars become shorter
+# behind a kink, after that first solve there, at which they may be several times as wide.
 
-_WIDER = 1.3  # a solve later
-_STEADY = 1.5  # ratio of K of two solves, at most
+_WIDER, _WIDER_BEHIND_KINK = 1.3, 8.0  # a solve later
+_OF_ETA = 0.25  # of it, that bars become wider by beside
+_STEADY = 2.0  # ratio of K of two solves, at most
+_ROOM = 1.5  # cells: least radius of the domain of K around a tip
 
 
-def foretold_bars(answers_before: Answers, answers_now: Answers) -> Answers | None:
+def foretold_bars(
+    answers_before: Answers, answers_now: Answers, widths: tuple[float, float], is_behind_kink: bool
+) -> Answers | None:
     """K of all states and cracks with errors in proportion to it; None where they may be others.
 
     Parameters
@@ -105,30 +110,45 @@ def foretold_bars(answers_before: Answers, answers_now: Answers) -> Answers | No
         Of the last solve, with bars.
     answers_now : sequence of sequence of SIF
         Without.
+    widths : (float, float)
+        Largest half-widths of K_I and of K_II, over the largest K: where one would be wider, it is
+        to be known better.
+    is_behind_kink : bool
+        Whether the last solve was the first one, before cracks have kinked.
     """
     if [len(state) for state in answers_before] != [len(state) for state in answers_now]:
         return None
     rows = []
     for old_state, new_state in zip(answers_before, answers_now, strict=True):
-        cracks = [_with_foretold_bars(a, b) for a, b in zip(old_state, new_state, strict=True)]
+        cracks = [
+            _with_foretold_bars(a, b, is_behind_kink)
+            for a, b in zip(old_state, new_state, strict=True)
+        ]
         if any(crack is None for crack in cracks):
             return None
         rows.append(tuple(crack for crack in cracks if crack is not None))
-    return tuple(rows)
+    all_sifs = [crack for row in rows for crack in row]
+    K, bar = (np.abs(np.concatenate(part)) for part in zip(*((sif.K, sif.bar) for sif in all_sifs)))
+    is_narrow = bar.max(axis=0, initial=0.0) <= np.array(widths) * K.max(initial=0.0)
+    return tuple(rows) if is_narrow.all() else None
 
 
-def _with_foretold_bars(old_sif: SIF, new_sif: SIF) -> SIF | None:
+def _with_foretold_bars(old_sif: SIF, new_sif: SIF, is_behind_kink: bool) -> SIF | None:
     errors = old_sif.errors
     if errors is None or any(errors.reasons) or not np.array_equal(old_sif.closed, new_sif.closed):
         return None
     size = [np.linalg.norm(sif.K, axis=1) for sif in (old_sif, new_sif)]
-    if not np.array_equal(size[0] > 0, size[1] > 0):
+    if not np.array_equal(size[0] > 0, size[1] > 0) or (new_sif.domain_cells < _ROOM).any():
         return None
     ratio = np.divide(size[1], size[0], out=np.ones_like(size[0]), where=size[0] > 0)[:, None]
     if ((ratio > _STEADY) | (ratio < 1 / _STEADY)).any():
         return None
-    contact = None if errors.contact is None else _WIDER * ratio * errors.contact
-    bar = _WIDER * ratio * errors.bar
+    old_bar, factor = errors.bar, _WIDER
+    if is_behind_kink:  # modes mix
+        old_bar = np.broadcast_to(old_bar.max(axis=1, keepdims=True), old_bar.shape)
+        factor = _WIDER_BEHIND_KINK
+    contact = None if errors.contact is None else factor * ratio * errors.contact
+    bar = ratio * (factor * old_bar + _OF_ETA * np.abs(errors.eta))
     return replace(new_sif, errors=bars_of(ratio * errors.eta, bar, errors.reasons, contact))
 
 
@@ -138,18 +158,11 @@ def add_K_error(
     corrected_step: Corrected,
     rates: Rates,
     sif: Answers,
-    is_foretold: bool = False,
 ) -> Corrected:
     """A settled step whose error also has what the bars of K have cost so far."""
     if corrected_step.error is None:
         return corrected_step
-    if is_foretold and step is not None and step.error is not None:  # in proportion to the bars
-        old_error = step.error
-        rate_error_now = RateError(
-            _WIDER * old_error.rate, _WIDER * old_error.rate_contact, _WIDER * old_error.turn
-        )
-    else:
-        rate_error_now = rate_error(rule, rates, sif)
+    rate_error_now = rate_error(rule, rates, sif)
     if step is None or step.error is None:
         error = replace(
             corrected_step.error, K=0.0, contact=0.0, unknown=0.0, K_place=0.0, grown=0.0
