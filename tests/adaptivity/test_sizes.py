@@ -13,7 +13,7 @@ from xcrack.adaptivity import sizes_3d
 from xcrack.adaptivity.indicators import counted_places, values
 from xcrack.adaptivity.resolved import resolved_fronts, resolved_tips
 from xcrack.adaptivity.sizes_2d import size_ratios
-from xcrack.mesh.locate import locate
+from xcrack.mesh.locate import cell_sizes, locate
 from xcrack.mesh.refinement import refine_to
 from xcrack.mesh.simplex import leg_size
 from xcrack.sif.error import finer_along
@@ -28,6 +28,14 @@ def block(*cracks, n=4):
 
 
 # Before K is known
+
+
+def test_first_mesh_sees_the_ends_of_a_flat_ellipse():
+    """Cells of 1.2 radii there, where they are as large as the tolerance lets them elsewhere."""
+    scene = block(xc.elliptic_crack((0.01, 0.02, 0.013), (0, 0, 1), (1, 0, 0), 0.5, 0.25), n=5)
+    mesh = sizes_3d.coarse_mesh(scene, 0.03)
+    at_end, at_side = cell_sizes(mesh, np.array([[0.51, 0.02, 0.013], [0.01, 0.27, 0.013]]))
+    assert at_end < 1.2 * 0.25**2 / 0.5 < at_side
 
 
 def test_a_mesh_that_is_fine_enough_stays():

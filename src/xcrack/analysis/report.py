@@ -237,7 +237,7 @@ def _moved_points(solutions: Sequence[Solution], support: Support) -> list[Alarm
         nodes = all_nodes[nearest_nodes(mesh, x, support.kind)]
     distance = np.linalg.norm(nodes - x, axis=1) / mesh.extent
     k = int(np.argmax(distance))
-    if distance[k] <= _HELD_ELSEWHERE or not any(_bears(s, support) for s in solutions):
+    if distance[k] <= _HELD_ELSEWHERE or not any(_has_reaction(s, support) for s in solutions):
         return []
     remedy = (
         "what bends between supports changes with their distance, and K with it. Give a mesh "
@@ -250,7 +250,7 @@ def _moved_points(solutions: Sequence[Solution], support: Support) -> list[Alarm
     return [Alarm(quantity, float(distance[k]), _HELD_ELSEWHERE, "", remedy)]
 
 
-def _bears(solution: Solution, support: Support) -> bool:
+def _has_reaction(solution: Solution, support: Support) -> bool:
     """Whether the reaction of a support is more than round-off leaves."""
     rows = solution.summary.resultants
     size = {row.name: float(np.linalg.norm(row.force)) for row in rows}

@@ -41,7 +41,7 @@ def _set_names(value: Any, label: str, error: Error) -> tuple[str, ...]:
 @check_arguments(MeshError)
 def fit_curves(
     mesh: Annotated[Mesh, Part(Mesh)],
-    where: Annotated[str | Sequence[str] | None, CheckedBy(_set_names)] = None,
+    sets: Annotated[str | Sequence[str] | None, CheckedBy(_set_names)] = None,
     *,
     angle: Annotated[float, Number(above=0.0, below=90.0)] = _ANGLE,
 ) -> Mesh:
@@ -54,7 +54,7 @@ def fit_curves(
     Parameters
     ----------
     mesh : Mesh
-    where : str or sequence of str, optional
+    sets : str or sequence of str, optional
         Facet sets to look at; the whole boundary if omitted.
     angle : float, degrees
         Facets that turn by more from one to the next meet at a corner.
@@ -70,7 +70,7 @@ def fit_curves(
     MeshError
         No such set.
     """
-    names = ("boundary",) if where is None else where
+    names = ("boundary",) if sets is None else sets
     facets = np.concatenate([facet_set(mesh, name, "fit_curves") for name in names])
     facets = np.unique(np.sort(facets, axis=1), axis=0)
     pairs, offset = _arcs(mesh, facets, angle)
@@ -208,9 +208,9 @@ def _sides(facets: Ints, normal: Floats, label: Ints, angle: float) -> Ints:
 
 def _ring(edges: Ints, count: int) -> tuple[Ints, Ints]:
     """Points `(r,)` and their neighbours, next ones and those behind them."""
-    ones = np.ones(2 * len(edges))
+    links = np.ones(2 * len(edges))
     pairs = (np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]]))
-    next_to = csr_array((ones, pairs), shape=(count, count))
+    next_to = csr_array((links, pairs), shape=(count, count))
     row, neighbour = (next_to + next_to @ next_to).nonzero()
     is_other = row != neighbour
     return row[is_other], neighbour[is_other]
@@ -236,14 +236,14 @@ def _normals(x: Floats, ring: tuple[Ints, Ints], normal: Floats) -> Floats:
     scale = np.add.reduceat(length, first) / np.bincount(row)
     for _ in range(_PASSES):
         tangents = _tangents(normal)
-        flat = np.einsum("qkd,qd->qk", tangents[row], d)
-        direction = flat / np.maximum(np.linalg.norm(flat, axis=1), 1e-300)[:, None]
+        shadow = np.einsum("qkd,qd->qk", tangents[row], d)
+        direction = shadow / np.maximum(np.linalg.norm(shadow, axis=1), 1e-300)[:, None]
         squares = [
             direction[:, i] * direction[:, j] * (length / scale[row])
-            for i in range(flat.shape[1])
+            for i in range(shadow.shape[1])
             for j in range(i + 1)
         ]
-        table = np.stack([*squares, *(2 * flat / length[:, None]).T], axis=1)
+        table = np.stack([*squares, *(2 * shadow / length[:, None]).T], axis=1)
         weight = (scale[row] / length) ** _NEARNESS
         value = 2 * np.einsum("qd,qd->q", d, normal[row]) / length
         rows = weight[:, None] * table
