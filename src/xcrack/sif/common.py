@@ -72,15 +72,15 @@ def mean_rotation(solution: Solution, distance: Floats, radius: float) -> Floats
     near_points = np.nonzero(distance < radius * (1 - 1e-9))[0]  # not those on the rim
     if len(near_points) <= d:
         return np.zeros((d, d))
-    y, u = np.zeros((2, len(near_points), 3))  # 2D turns about the third axis
     x = points[near_points]
-    y[:, :d], u[:, :d] = x - x.mean(axis=0), solution.coefficients[near_points]
+    y, u = x - x.mean(axis=0), solution.coefficients[near_points]
     square, product = y.T @ y, y.T @ u
-    inertia = square.trace() * np.eye(3) - square
     spin = product - product.T
-    moment = np.array([spin[1, 2], spin[2, 0], spin[0, 1]])
-    w = np.linalg.solve(inertia, moment)
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])[:d, :d]
+    if d == 2:  # about the third axis
+        return np.asarray(spin.T / square.trace())
+    inertia = square.trace() * np.eye(3) - square
+    w = np.linalg.solve(inertia, [spin[1, 2], spin[2, 0], spin[0, 1]])
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
 
 
 def material_at_tip(solution: Solution, t: int) -> Isotropic:

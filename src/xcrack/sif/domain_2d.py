@@ -89,7 +89,7 @@ def _ring_parts(solution: Solution, t: int, radii: Floats) -> Iterator[RingPart]
     space, elasticity = solution.space, solution.problem.elasticity
     x = space.tips[t].x
     # Within the first radius the gradient of q vanishes, and from one to the next it is smooth.
-    circles = Circles(x, np.unique([inner_radii(space.order, radii), radii]))
+    circles = Circles(x, np.array(sorted({*inner_radii(space.order, radii), *radii})))
     r_inner, r_outer = circles.radii[[0, -1]]
     for cells, n, degree in ring_classes(space, x, r_inner, r_outer):
         if not elasticity.is_uniform:

@@ -431,6 +431,8 @@ def _faces_press(solution: Solution, crack: int, x: Floats) -> bool:
 
 def _round_kinks(solution: Solution, crack: int) -> list[Floats]:
     """Kinks that the cut rounds off, at which the faces press."""
+    if solution.contact[crack] is None:
+        return []
     kinks, of_cut = kinks_inside(solution, crack), solution.space.cuts[crack].kinks.points
     if not len(kinks):
         return []

@@ -73,6 +73,8 @@ def constant_part(solution: Solution, t: int) -> float:
 
 def _steady_stress(solution: Solution, t: int) -> Floats:
     """Initial stress at the tip in its frame `(d, d)`."""
+    if not has_effect([solution], "initial_stress"):
+        return np.zeros((2, 2))
     tip, (x, cell, bary) = solution.space.tips[t], tip_place(solution, t)
     initial_stress = initial_stress_at(solution, cell, bary, x, True)[0]
     return np.asarray(tip.frame @ initial_stress @ tip.frame.T)

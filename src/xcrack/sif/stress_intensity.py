@@ -114,10 +114,10 @@ def stress_intensities(
     solutions_under_load = [s for s in solutions if not s.at_rest] or solutions[:1]
     ends = space.tips_of(crack)
     doubts: list[str] = []
-    with threads(solutions[0].problem.numerics.threads):
-        if space.dim < 3:
-            by_end, doubts = tip_intensities(solutions_under_load, ends)
-        else:
+    if space.dim < 3:
+        by_end, doubts = tip_intensities(solutions_under_load, ends)
+    else:
+        with threads(solutions[0].problem.numerics.threads):
             by_end = [front_intensity(solutions_under_load, t) for t in ends]
     by_state = [
         joined_sif([states[k] for states in by_end], space.dim)

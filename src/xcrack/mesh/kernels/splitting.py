@@ -543,6 +543,16 @@ def _put_fans_around(  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _misses_ring(corner, centre, radii):  # type: ignore[no-untyped-def]
+    """Whether a triangle (3, 2) lies within the first of some circles, or beyond the last."""
+    largest_distance = 0.0
+    for i in range(3):
+        x, y = corner[i, 0] - centre[0], corner[i, 1] - centre[1]
+        largest_distance = max(largest_distance, math.hypot(x, y))
+    return largest_distance <= radii[0] or _distance(centre[0], centre[1], corner) >= radii[-1]
+
+
+@kernel
 def triangle_points(  # type: ignore[no-untyped-def]
     bary, corners, share, bears_tip, fan, tips, levels, plain_rule, plain_share, rule_near,
     rule_near_share, s, ws, t, wt, centre, radii,
@@ -574,7 +584,8 @@ def triangle_points(  # type: ignore[no-untyped-def]
         The tip whose fans begin and end at circles around it.
     radii : (c,) array, length
         Of these circles, increasing, at which an integrand is not smooth: it is zero within the
-        first and beyond the last. Where there are none, fans are whole.
+        first and beyond the last, so that parts there get no points. Where there are none, fans are
+        whole.
 
     Returns
     -------
@@ -622,6 +633,8 @@ def triangle_points(  # type: ignore[no-untyped-def]
                         vertex[i, b] += part[i, v] * bary[k, v, b]
                     for j in range(2):
                         corner[i, j] += part[i, v] * corners[k, v, j]
+            if len(radii) > 0 and _misses_ring(corner, centre, radii):
+                continue
             size, tip_of_part, least_distance = _longest_side(corner), 0, np.inf
             for m in range(len(tips)):
                 distance = _distance(tips[m, 0], tips[m, 1], corner)
