@@ -247,6 +247,32 @@ def test_fans_begin_and_end_at_circles():
     assert np.bincount(number, weight) == pytest.approx(cross / 2, abs=1e-14)
 
 
+def test_no_points_where_an_integrand_vanishes():
+    """What is left out lies within the first circle or beyond the last; the others are the same."""
+    from xcrack.mesh.kernels.splitting import triangle_points
+    from xcrack.mesh.simplex import gauss, simplex_rule
+
+    rng = np.random.default_rng(5221)
+    x, radii = rng.uniform(size=(60, 3, 2)), np.array([0.3, 0.4])
+    flags = np.ones(60, dtype=bool)
+    triangles = np.broadcast_to(np.eye(3), (60, 3, 3)).copy(), x, np.ones(60), flags, ~flags
+    rules = *simplex_rule(2, 2), *simplex_rule(2, 4), *gauss(5), *gauss(8)
+    tips = np.array([[0.5, 0.5]])
+    points = triangle_points(*triangles, tips, 4, *rules, tips[0], np.zeros(0))
+    fewer_points = triangle_points(*triangles, tips, 4, *rules, tips[0], radii)
+    rows, chosen_rows = (
+        [tuple(row) for row in np.column_stack(columns).tolist()]
+        for columns in (points, fewer_points)
+    )
+    assert set(chosen_rows) < set(rows)
+    omitted = np.array(sorted(set(rows) - set(chosen_rows)))
+    at = np.einsum("qb,qbd->qd", omitted[:, 1:4], x[omitted[:, 0].astype(int)])
+    r = np.linalg.norm(at - tips[0], axis=1)
+    assert ((r <= radii[0]) | (r >= radii[-1])).all()
+    assert (r <= radii[0]).any()
+    assert (r >= radii[-1]).any()
+
+
 # --- kernels of fields and of the plane's interaction integral against their naive twins ----------
 
 
@@ -430,6 +456,30 @@ def arrays(A):
     return A.indptr, A.indices, A.data
 
 
+def test_bordered_with_groups():
+    """Columns that share their rows, those that share some, and rows of standard unknowns."""
+    rng = np.random.default_rng(4413)
+    A, Z, fixed = spd(rng, 40), np.zeros((40, 11)), np.zeros(40, dtype=bool)
+    fixed[[3, 17, 29]] = True
+    for columns, rows in (
+        ([0, 1, 2], [4, 5, 28, 30, 31]), ([3, 4], [30, 31, 33]), ([5], [6]), ([6], [6, 34]),
+        ([7, 8, 9], [0, 1, 35, 36, 37]), ([10], [38]),
+    ):  # fmt: skip
+        Z[np.ix_(rows, columns)] = rng.normal(size=(len(rows), len(columns)))
+    matrix, basis, energy = bordered_matrix(
+        *arrays(sp.csr_matrix(A)), *arrays(sp.csr_matrix(Z)), 11, fixed, 28
+    )
+    columns = np.concatenate([np.eye(40)[:, :28][:, ~fixed[:28]], Z], axis=1)
+    expected = columns / np.sqrt(np.diag(columns.T @ A @ columns))
+    size = expected.shape[1]
+    result = sp.csr_matrix((basis[2], basis[1], basis[0]), shape=(40, size)).toarray()
+    np.testing.assert_allclose(result, expected, rtol=1e-13)
+    np.testing.assert_allclose(energy, np.diag(Z.T @ A @ Z), rtol=1e-13)
+    reduced = sp.csc_matrix((matrix[2], matrix[1], matrix[0]), shape=(size, size))
+    assert reduced.has_sorted_indices
+    np.testing.assert_allclose(reduced.toarray(), expected.T @ A @ expected, atol=1e-13)
+
+
 def test_bordered():
     """Both sides scaled; fixed unknowns and those without energy are left out."""
     rng = np.random.default_rng(4411)
@@ -439,9 +489,9 @@ def test_bordered():
     Z[6:, 0], Z[[1, 7], 1] = rng.normal(size=3), rng.normal(size=2)
     fixed = np.zeros(9, dtype=bool)
     fixed[4] = True
-    products = (Z, A @ Z, Z.T @ A, Z.T @ A @ Z)
-    parts = (arrays(sp.csr_matrix(each)) for each in products)
-    matrix, basis, energy = bordered_matrix(*arrays(sp.csr_matrix(A)), *parts, fixed, 6)
+    matrix, basis, energy = bordered_matrix(
+        *arrays(sp.csr_matrix(A)), *arrays(sp.csr_matrix(Z)), 2, fixed, 6
+    )
     columns = np.concatenate([np.eye(9)[:, [0, 1, 3, 5]], Z], axis=1)
     expected = columns / np.sqrt(np.diag(columns.T @ A @ columns))
     result = sp.csr_matrix((basis[2], basis[1], basis[0]), shape=(9, 6)).toarray()

@@ -187,13 +187,15 @@ def test_a_factor_that_lost_its_digits_is_replaced(monkeypatch):
 
 @pytest.mark.parametrize("depth", [0, 1, 2, 5])
 def test_children_come_before_parents(depth):
-    order, rank = postorder(depth)
+    order, rank, height = postorder(depth)
     assert sorted(order) == list(range(1, 2 ** (depth + 1)))
     np.testing.assert_array_equal(order[rank[1:]], np.arange(1, 2 ** (depth + 1)))
     for p in range(1, 2**depth):
         assert rank[2 * p] < rank[2 * p + 1] < rank[p]
         # A subtree is a stretch, the second child's right before the parent.
         assert rank[2 * p + 1] == rank[p] - 1
+    for p in range(1, 2 ** (depth + 1)):
+        assert height[rank[p]] == depth - int(np.log2(p))
 
 
 @pytest.mark.parametrize("dim", [2, 3])

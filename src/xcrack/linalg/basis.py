@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from xcrack.base.arrays import Bools, Floats, Ints, offsets, ranges
+from xcrack.base.arrays import Bools, Floats, Ints, offsets
 from xcrack.base.machine import one_blas_thread
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.mesh import Mesh
@@ -32,11 +32,14 @@ class Blocks:
     offsets : (b + 1,) array of int
     n_standard : (b,) array of int
         Leading members of each block that are kept as they are.
+    nodes : (b,) array of int
+        At which each block is.
     """
 
     members: Ints
     offsets: Ints
     n_standard: Ints
+    nodes: Ints
 
 
 def function_nodes(space: FunctionSpace) -> Ints:
@@ -52,25 +55,25 @@ def function_nodes(space: FunctionSpace) -> Ints:
     return owner
 
 
-def node_blocks(space: FunctionSpace, kind: str) -> Blocks:
-    """Unknowns of each enriched node, in blocks: "node" or "star"."""
-    owner = function_nodes(space)
+def node_blocks(space: FunctionSpace, kind: str, is_free: Bools) -> Blocks:
+    """Free unknowns of each enriched node, in blocks: "node" or "star"."""
+    owner, d = function_nodes(space), space.dim
     if kind == "star" and space.order == 2:
         for c, number in enumerate(space.heaviside):
             nodes = np.nonzero(number >= 0)[0]
             owner[number[nodes]] = _star_home(space, c, nodes)
-    tip_functions = np.arange(space.n_nodes, space.n_functions)
-    order = np.argsort(owner[tip_functions], kind="stable")
-    functions = tip_functions[order]
-    nodes, counts = np.unique(owner[functions], return_counts=True)
-    d = space.dim
-    row, place = ranges(1 + counts)
-    first = offsets(counts)[:-1]
-    function = np.where(
-        place == 0, nodes[row], functions[np.minimum(first[row] + place - 1, len(functions) - 1)]
-    )
-    members = (function[:, None] * d + np.arange(d)).ravel()
-    return Blocks(members, offsets((1 + counts) * d), np.full(len(nodes), d))
+    owner = owner[space.n_nodes :]
+    nodes = np.nonzero(np.bincount(owner, minlength=1))[0]
+    # Sorted by node, and so that standard functions are the first of each.
+    order = np.argsort(np.concatenate([nodes, owner]), kind="stable")
+    functions = np.concatenate([nodes, np.arange(space.n_nodes, space.n_functions)])[order]
+    is_standard = order < len(nodes)
+    members = (functions[:, None] * d + np.arange(d)).ravel()
+    keep = is_free[members]
+    block = np.repeat(np.cumsum(is_standard) - 1, d)[keep]
+    counts = np.bincount(block, minlength=len(nodes))
+    n_standard = np.bincount(block, np.repeat(is_standard, d)[keep], len(nodes)).astype(np.int64)
+    return Blocks(members[keep], offsets(counts), n_standard, nodes)
 
 
 def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
@@ -87,17 +90,6 @@ def _star_home(space: FunctionSpace, c: int, nodes: Ints) -> Ints:
     move = (~np.isnan(cut.cut_edge[edge]) | on_crack) & (space.heaviside[c][end] >= 0)
     home[is_edge] = np.where(move, end, nodes[is_edge])
     return home
-
-
-def restrict_blocks(blocks: Blocks, is_free: Bools) -> Blocks:
-    """Blocks without the unknowns that supports decide."""
-    keep = is_free[blocks.members]
-    block, place = ranges(np.diff(blocks.offsets))
-    standard = np.bincount(
-        block[keep & (place < blocks.n_standard[block])], minlength=len(blocks.n_standard)
-    )
-    counts = np.bincount(block[keep], minlength=len(blocks.n_standard))
-    return Blocks(blocks.members[keep], offsets(counts), standard)
 
 
 def orthonormal_functions(K: sp.csr_matrix, blocks: Blocks) -> sp.csr_matrix:
@@ -164,7 +156,7 @@ def patch_orthogonal(
         [np.arange(space.n_dof)],
         [np.ones(space.n_dof)],
     )
-    members, counts, n_patch = [], [], []
+    members, counts, n_patch, patch_points = [], [], [], []
     for tip in space.tips:
         for point in np.nonzero(tip.point_to_function >= 0)[0]:
             if star is not None:
@@ -179,8 +171,12 @@ def patch_orthogonal(
             members.append(np.concatenate([patch, F]))
             counts.append(len(patch) + len(F))
             n_patch.append(len(patch))
+            patch_points.append(point)
     if members:
-        blocks = Blocks(np.concatenate(members), offsets(np.array(counts)), np.array(n_patch))
+        blocks = Blocks(
+            np.concatenate(members), offsets(np.array(counts)), np.array(n_patch),
+            np.array(patch_points),
+        )  # fmt: skip
         for group, k, n_p in _by_shape(K, blocks):
             pp, pf = k[:, :n_p, :n_p], k[:, :n_p, n_p:]
             diagonal = np.einsum("bii->bi", pp)

@@ -19,7 +19,6 @@ from xcrack.linalg.basis import (
     node_blocks,
     orthonormal_functions,
     patch_orthogonal,
-    restrict_blocks,
 )
 from xcrack.linalg.engine import (
     CondensedSystem,
@@ -138,11 +137,11 @@ class DirectSystem:
         if f.ndim == 1:
             return self._displacements_of(self.apply_inverse(b), u_imposed)
         first, scale = proportional_columns(b)
-        distinct_columns = np.unique(first)
-        y = self.apply_inverse(b if len(distinct_columns) == b.shape[1] else b[:, distinct_columns])
-        return self._displacements_of(
-            y[:, np.searchsorted(distinct_columns, first)] * scale, u_imposed
-        )
+        is_distinct = first == np.arange(len(first))
+        if is_distinct.all():
+            return self._displacements_of(self.apply_inverse(b), u_imposed)
+        y = self.apply_inverse(b[:, is_distinct])
+        return self._displacements_of(y[:, is_distinct.cumsum()[first] - 1] * scale, u_imposed)
 
     def first_look(
         self, f: Floats, u_imposed: Floats, closed_before: bool
@@ -405,18 +404,10 @@ def _reduced_columns(
     first = space.n_nodes * space.dim
     tip_columns = _enriched_columns(space, K, ~is_fixed, numerics, material)
     while True:
-        coupling = K @ tip_columns
-        coupling.sort_indices()
-        coupling_of_rows = coupling.T.tocsr()
-        enriched_part = coupling_of_rows @ tip_columns
-        enriched_part.sort_indices()
-        parts = (
-            (part.indptr, part.indices, part.data)
-            for part in (tip_columns, coupling, coupling_of_rows, enriched_part)
-        )
         matrix, columns, energy = bordered_matrix(
-            K.indptr, K.indices, K.data, *parts, is_fixed, first
-        )
+            K.indptr, K.indices, K.data, tip_columns.indptr, tip_columns.indices, tip_columns.data,
+            tip_columns.shape[1], is_fixed, first,
+        )  # fmt: skip
         has_energy = energy > 0
         if has_energy.all():
             break
@@ -445,9 +436,7 @@ def _enriched_columns(
         change = sp.csr_matrix(patch if change is None else change @ patch)
         K = sp.csr_matrix(patch.T @ K @ patch)
     if numerics.orthonormal != "none" and n > first:
-        Z = orthonormal_functions(
-            K, restrict_blocks(node_blocks(space, numerics.orthonormal), is_free)
-        )
+        Z = orthonormal_functions(K, node_blocks(space, numerics.orthonormal, is_free))
     else:
         free_unknowns = first + np.nonzero(is_free[first:])[0]
         unit_entries = (np.ones(len(free_unknowns)), (free_unknowns, np.arange(len(free_unknowns))))

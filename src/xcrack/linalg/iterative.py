@@ -21,7 +21,6 @@ from xcrack.linalg.basis import (
     node_blocks,
     orthonormal_functions,
     patch_orthogonal,
-    restrict_blocks,
 )
 from xcrack.linalg.engine import (
     CondensedSystem,
@@ -443,15 +442,14 @@ def iterative_system(
         tip_modes, in_use = tip_columns(is_free)
     if stars and space.tips:
         tip_modes, inverse = _star_orthogonal_basis(space, near_entries, tip_modes, in_use)
-    node_groups = node_blocks(space, "star" if stars else "node")
-    blocks = restrict_blocks(node_groups, in_use)
+    blocks = node_blocks(space, "star" if stars else "node", in_use)
     enriched_columns, starts, block = enriched_basis(space, near_entries, blocks, levels, tip_modes)
     parts = parts_of(levels, near_entries, standard, enriched_columns)
     border, diagonal = parts.border_factor(starts), parts.diagonal
     patches = None
     if stars and len(block):
         home = np.where(levels.is_free, standard // d, -1)
-        home = np.concatenate([home, node_groups.members[node_groups.offsets[block]] // d])
+        home = np.concatenate([home, blocks.nodes[block]])
         patches = star_patches(space, home, len(standard), diagonal, parts.entries)
     block_entries = within_blocks(near_entries, blocks) if tip_modes is None else None
     del parts, near_entries  # before the cycle makes copies in single precision

@@ -39,8 +39,8 @@ class Tree:
         Of the shape functions.
     node_to_part : (n_nodes,) array of int
         Heap numbers: 1 is the whole mesh, 2 p and 2 p + 1 are the halves of p.
-    postorder, rank : arrays of int
-        Parts, children first, and the place of each part.
+    postorder, rank, height : arrays of int
+        Parts, children first; the place of each part; the levels below the part at each place.
     """
 
     mesh: Mesh
@@ -48,6 +48,7 @@ class Tree:
     node_to_part: Ints
     postorder: Ints
     rank: Ints
+    height: Ints
 
 
 def tree(mesh: Mesh, order: int) -> Tree:
@@ -66,8 +67,7 @@ def tree(mesh: Mesh, order: int) -> Tree:
     leaf = bisect_cells(ranking, centre, mesh.cells, mesh.n_points, depth)
     nodes = np.ascontiguousarray(cell_nodes(mesh, order))
     part = node_parts(nodes, leaf, depth, int(nodes.max()) + 1)
-    parts, rank = postorder(depth)
-    return Tree(mesh, order, lock(part), lock(parts), lock(rank))
+    return Tree(mesh, order, lock(part), *map(lock, postorder(depth)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,25 +208,19 @@ def factorise(
     """
     from xcrack.linalg.kernels.multifrontal import (
         arrange_parts,
-        column_parts,
-        heights,
+        order_columns,
         places_of_squares,
         sizes,
         unchanged_parts,
     )
 
-    order, rank = tree.postorder, tree.rank
-    part = rank[column_parts(*columns, tree.node_to_part)]
-    perm = np.argsort(part, kind="stable")
-    place = np.empty(len(perm), dtype=np.int32)
-    place[perm] = np.arange(len(perm))
-    first = np.searchsorted(part[perm], np.arange(len(order) + 1))
+    order, rank, height = tree.postorder, tree.rank, tree.height
+    perm, place, first = order_columns(*columns, tree.node_to_part, rank)
     begin, boundary, in_parent, start, row, value = arrange_parts(
         A.indptr, A.indices, A.data, first, order, rank, perm, place
     )
     fronts = first, begin, in_parent, start, row, value, order, rank
-    panel_size, update_size, _ = sizes(first, begin)
-    height = heights(order, rank)
+    panel_size, update_size = sizes(first, begin)
     depth = int(height[-1])
     # Update matrices of parts with that many levels below are kept for the next factorisation.
     lowest_height = min(_UNIT, depth)

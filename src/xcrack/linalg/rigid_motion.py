@@ -15,6 +15,7 @@ from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import at_joints, n_parts, part_numbers, sub_cells
 from xcrack.mesh.locate import barycentric
 
+_HELD = 1e-6  # least eigenvalue of supported rows of motions of length one from which none is left
 _IMBALANCE = 1e-3  # share of the sum of all forces above which loads count as out of balance
 
 
@@ -41,7 +42,12 @@ class Motion:
 
 def free_modes(space: FunctionSpace, is_fixed: Bools) -> Floats:
     """Orthonormal rigid motions left by supports of standard unknowns `(n,)`: `(n, k)`."""
-    R = np.linalg.qr(rigid_modes(space.node_points))[0]
+    motions = rigid_modes(space.node_points)
+    # Most bodies are held: motions of length one, orthogonal or not, show that at less cost.
+    supported_rows = motions[is_fixed] / np.sqrt(np.einsum("im,im->m", motions, motions))
+    if np.linalg.eigvalsh(supported_rows.T @ supported_rows)[0] > _HELD:
+        return np.zeros((len(motions), 0))
+    R = np.linalg.qr(motions)[0]
     supported_rows = R[is_fixed]
     gram = supported_rows.T @ supported_rows
     w, V = np.linalg.eigh(gram)

@@ -554,8 +554,8 @@ def node_parts(cell_nodes, leaf, depth, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def column_parts(indptr, indices, n_columns, owner, d, part):  # type: ignore[no-untyped-def]
-    """Lowest part that holds the support of each column of a basis.
+def order_columns(indptr, indices, n_columns, owner, d, part, rank):  # type: ignore[no-untyped-def]
+    """Columns of a basis part by part: each belongs to the lowest that holds its support.
 
     Parameters
     ----------
@@ -566,25 +566,44 @@ def column_parts(indptr, indices, n_columns, owner, d, part):  # type: ignore[no
         Node of each function; unknown i belongs to function i // d.
     d : int
     part : (n_nodes,) array of int
+    rank : (parts + 1,) array of int
+        Of `postorder`.
 
     Returns
     -------
-    (n_columns,) array of int
+    perm : (n_columns,) array of int
+        Column at each place.
+    place : (n_columns,) array of int32
+        Place of each column.
+    first : (parts + 1,) array of int
+        First place of each part in postorder.
     """
-    result = zeros(n_columns, dtype=np.int64)
+    own_part = zeros(n_columns, dtype=np.int64)
     for i in range(len(indptr) - 1):
         for k in range(indptr[i], indptr[i + 1]):
-            result[indices[k]] = _ancestor(result[indices[k]], part[owner[i // d]])
+            own_part[indices[k]] = _ancestor(own_part[indices[k]], part[owner[i // d]])
+    first = zeros(len(rank), dtype=np.int64)
     for column in range(n_columns):
-        result[column] = max(result[column], 1)
-    return result
+        own_part[column] = rank[max(own_part[column], 1)]
+        first[own_part[column] + 1] += 1
+    perm, place = empty(n_columns, dtype=np.int64), empty(n_columns, dtype=np.int32)
+    end = empty(len(rank), dtype=np.int64)
+    for t in range(len(rank) - 1):
+        end[t] = first[t]
+        first[t + 1] += first[t]
+    for column in range(n_columns):
+        place[column] = end[own_part[column]]
+        perm[place[column]] = column
+        end[own_part[column]] += 1
+    return perm, place, first
 
 
 @kernel
 def postorder(depth):  # type: ignore[no-untyped-def]
-    """Parts in the order children before parents, and the place of each part in it."""
+    """Parts, children before parents; the place of each part there; levels below each place."""
     count = (1 << (depth + 1)) - 1
     order, rank = empty(count, dtype=np.int64), zeros(count + 1, dtype=np.int64)
+    height = empty(count, dtype=np.int64)
     # The subtree of a part with h levels below it takes 2^(h + 1) - 1 places, its own last.
     begin = zeros(count + 1, dtype=np.int64)
     depth_below = depth
@@ -592,11 +611,11 @@ def postorder(depth):  # type: ignore[no-untyped-def]
         if p >= (2 << (depth - depth_below)):
             depth_below -= 1
         rank[p] = begin[p] + (2 << depth_below) - 2
-        order[rank[p]] = p
+        order[rank[p]], height[rank[p]] = p, depth_below
         if depth_below > 0:
             begin[2 * p] = begin[p]
             begin[2 * p + 1] = begin[p] + (1 << depth_below) - 1
-    return order, rank
+    return order, rank, height
 
 
 @kernel
@@ -701,26 +720,14 @@ def arrange_parts(indptr, indices, data, first, order, rank, perm, place):  # ty
 
 @kernel
 def sizes(first, begin):  # type: ignore[no-untyped-def]
-    """Entries of the panel of each part and of its update matrix, and its operations."""
+    """Entries of the panel of each part and of its update matrix."""
     parts = len(begin) - 1
     panel, update = zeros(parts, dtype=np.int64), zeros(parts, dtype=np.int64)
-    work = zeros(parts)
     for t in range(parts):
         k, b = first[t + 1] - first[t], begin[t + 1] - begin[t]
         panel[t] = (k + b) * k
         update[t] = b * (b + 1) // 2
-        work[t] = k**3 / 3.0 + k * k * b + k * b * (b + 1.0)
-    return panel, update, work
-
-
-@kernel
-def heights(order, rank):  # type: ignore[no-untyped-def]
-    """Levels below each part `(parts,)`."""
-    height = zeros(len(order), dtype=np.int64)
-    for t in range(len(order)):
-        if 2 * order[t] <= len(order):
-            height[t] = height[rank[2 * order[t]]] + 1
-    return height
+    return panel, update
 
 
 @kernel

@@ -80,22 +80,133 @@ def residual(indptr, indices, data, x, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _transpose(start, index, value, n_columns):  # type: ignore[no-untyped-def]
+    """CSR arrays of the transposed matrix, sorted."""
+    begin = zeros(n_columns + 1, np.int32)
+    for k in range(len(index)):
+        begin[index[k] + 1] += 1
+    place = empty(n_columns, np.int32)
+    for c in range(n_columns):
+        place[c] = begin[c]
+        begin[c + 1] += begin[c]
+    row, entry = empty(len(index), np.int32), empty(len(index))
+    for i in range(len(start) - 1):
+        for k in range(start[i], start[i + 1]):
+            to = place[index[k]]
+            row[to], entry[to] = i, value[k]
+            place[index[k]] = to + 1
+    return begin, row, entry
+
+
+@kernel
+def _groups(start, row):  # type: ignore[no-untyped-def]
+    """First row of each group of rows that follow each other and have the same columns."""
+    first, count = zeros(len(start), np.int64), 0
+    for c in range(1, len(start)):
+        size = start[c] - start[c - 1]
+        is_alike = c < len(start) - 1 and start[c + 1] - start[c] == size
+        for k in range(size if is_alike else 0):
+            is_alike = is_alike and row[start[c] + k] == row[start[c - 1] + k]
+        if not is_alike:
+            count += 1
+            first[count] = c
+    return first[: count + 1]
+
+
+@kernel
+def _group_product(  # type: ignore[no-untyped-def]
+    first, start, row, value, other_start, other_column, other_value, width, is_symmetric
+):
+    """A B for a matrix A in groups of rows with the same columns, group by group.
+
+    Parameters
+    ----------
+    first : (groups + 1,) array of int
+        First row of each group.
+    start, row, value : arrays
+        Columns of A in each group, and their values, those in the rows of a group side by side.
+    other_start, other_column, other_value : CSR arrays of B
+    width : int
+        Columns of B.
+    is_symmetric : bool
+        Of a symmetric product columns before those of the group are left out.
+
+    Returns
+    -------
+    start, column, value : arrays
+        The same of the product, sorted.
+    back_start, back_group, back_place : arrays of int
+        Groups that have each column, increasing, and where its values begin.
+    """
+    groups, entries = len(first) - 1, 0
+    for k in range(start[groups]):
+        entries += other_start[row[k] + 1] - other_start[row[k]]
+    begin, unsorted_column = zeros(groups + 1, np.int64), empty(entries, np.int32)
+    back_start, place = zeros(width + 1, np.int64), empty(width, np.int64)
+    for c in range(width):
+        place[c] = -1
+    for g in range(groups):
+        count, first_column = begin[g], first[g] if is_symmetric else 0
+        for k in range(start[g], start[g + 1]):
+            for j in range(other_start[row[k]], other_start[row[k] + 1]):
+                c = other_column[j]
+                if c >= first_column and place[c] != g:
+                    place[c], unsorted_column[count] = g, c
+                    back_start[c + 1] += 1
+                    count += 1
+        begin[g + 1] = count
+    for c in range(width):
+        place[c] = back_start[c]
+        back_start[c + 1] += back_start[c]
+    back_group, back_place = empty(begin[groups], np.int64), empty(begin[groups], np.int64)
+    numbers, end, to = 0, empty(groups, np.int64), empty(groups, np.int64)
+    for g in range(groups):
+        end[g], to[g] = numbers, begin[g]
+        numbers += (first[g + 1] - first[g]) * (begin[g + 1] - begin[g])
+        for k in range(begin[g], begin[g + 1]):
+            c = unsorted_column[k]
+            back_group[place[c]] = g
+            place[c] += 1
+    column = unsorted_column
+    for c in range(width):
+        for k in range(back_start[c], back_start[c + 1]):
+            g = back_group[k]
+            back_place[k], column[to[g]] = end[g], c
+            end[g] += first[g + 1] - first[g]
+            to[g] += 1
+    result, source, numbers = zeros(numbers), 0, 0
+    for g in range(groups):
+        rows, first_column = first[g + 1] - first[g], first[g] if is_symmetric else 0
+        for k in range(begin[g], begin[g + 1]):
+            place[column[k]] = numbers
+            numbers += rows
+        for k in range(start[g], start[g + 1]):
+            for j in range(other_start[row[k]], other_start[row[k] + 1]):
+                if other_column[j] >= first_column:
+                    at, factor = place[other_column[j]], other_value[j]
+                    for q in range(rows):
+                        result[at + q] += value[source + q] * factor
+            source += rows
+    return begin, column, result, back_start, back_group, back_place
+
+
+@kernel
 def bordered_matrix(  # type: ignore[no-untyped-def]
-    indptr, indices, data, Z, coupling, coupling_of_columns, corner_block, is_fixed, first
+    indptr, indices, data, Z_start, Z_column, Z_value, m, is_fixed, n_standard
 ):
     """A symmetric matrix in a basis of its first unknowns and of enriched columns.
 
     Columns are scaled to energy one. Standard unknowns that are fixed or have no energy are left
-    out.
+    out. Only rows of K in which a column has entries are multiplied out, for columns with the same
+    rows at once.
 
     Parameters
     ----------
     indptr, indices, data : CSR arrays of K, (n, n)
-    Z : tuple of CSR arrays, (n, m)
-    coupling, coupling_of_columns, corner_block : tuples of CSR arrays, (n, m), (m, n), (m, m)
-        K Z, its transpose, and Zᵀ K Z; sorted.
+    Z_start, Z_column, Z_value : CSR arrays of Z, (n, m)
+    m : int
     is_fixed : (n,) array of bool
-    first : int
+    n_standard : int
         Number of standard unknowns.
 
     Returns
@@ -107,19 +218,34 @@ def bordered_matrix(  # type: ignore[no-untyped-def]
         Of the enriched columns before they are scaled; where one is not positive, drop its column
         and call again.
     """
-    Z_start, Z_column, Z_value = Z
-    across_start, across_column, across_value = coupling
-    down_start, down_row, down_value = coupling_of_columns
-    own_start, own_column, own_value = corner_block
-    n, m = len(indptr) - 1, len(own_start) - 1
-    energy = zeros(m)
-    for c in range(m):
-        for k in range(own_start[c], own_start[c + 1]):
-            if own_column[k] == c:
-                energy[c] = own_value[k]
-    number, count = empty(first, np.int32), 0
-    scale = empty(first + m)
-    for i in range(first):
+    n = len(indptr) - 1
+    Zt_start, Zt_row, Zt_value = _transpose(Z_start, Z_column, Z_value, m)
+    first = _groups(Zt_start, Zt_row)
+    start = zeros(len(first), np.int64)
+    for g in range(len(first) - 1):
+        start[g + 1] = start[g] + Zt_start[first[g] + 1] - Zt_start[first[g]]
+    row, value, to = empty(start[-1], np.int32), empty(len(Zt_value)), 0
+    for g in range(len(first) - 1):
+        for k in range(start[g + 1] - start[g]):
+            row[start[g] + k] = Zt_row[Zt_start[first[g]] + k]
+            for c in range(first[g], first[g + 1]):
+                value[to] = Zt_value[Zt_start[c] + k]
+                to += 1
+    # Zᵀ K, and Zᵀ K Z from the diagonal on.
+    side_start, side_row, side_value, across_start, across_group, across_place = _group_product(
+        first, start, row, value, indptr, indices, data, n, False
+    )
+    own_start, own_column, own_value, back_start, back_group, back_place = _group_product(
+        first, side_start, side_row, side_value, Z_start, Z_column, Z_value, m, True
+    )
+    energy, scale = zeros(m), empty(n_standard + m)
+    for g in range(len(first) - 1):
+        for c in range(first[g], first[g + 1]):
+            for k in range(back_start[c], back_start[c + 1]):
+                if back_group[k] == g:
+                    energy[c] = own_value[back_place[k] + c - first[g]]
+    number, count = empty(n_standard, np.int32), 0
+    for i in range(n_standard):
         energy_i = 0.0
         number[i] = -1
         for k in range(indptr[i], indptr[i + 1]):
@@ -131,60 +257,67 @@ def bordered_matrix(  # type: ignore[no-untyped-def]
             count += 1
     for c in range(m):
         scale[count + c] = 1 / np.sqrt(energy[c])
-    start = zeros(count + m + 1, np.int32)
-    for i in range(first):
+    room = len(data)  # and what couples with enriched columns, on both sides of the diagonal
+    for g in range(len(first) - 1):
+        couplings = side_start[g + 1] - side_start[g] + own_start[g + 1] - own_start[g]
+        room += 2 * (first[g + 1] - first[g]) * couplings
+    rows, values = empty(room, np.int32), empty(room)
+    begin, place = zeros(count + m + 1, np.int32), 0
+    for i in range(n_standard):
         if number[i] >= 0:
-            entries = across_start[i + 1] - across_start[i]
+            own_scale = scale[number[i]]
             for j in range(indptr[i], indptr[i + 1]):
-                if indices[j] < first and number[indices[j]] >= 0:
-                    entries += 1
-            start[number[i] + 1] = entries
-    for c in range(m):
-        entries = own_start[c + 1] - own_start[c]
-        for j in range(down_start[c], down_start[c + 1]):
-            if down_row[j] < first and number[down_row[j]] >= 0:
-                entries += 1
-        start[count + c + 1] = entries
-    for c in range(count + m):
-        start[c + 1] += start[c]
-    rows, values = empty(start[count + m], np.int32), empty(start[count + m])
-    for i in range(first):
-        if number[i] >= 0:
-            place = start[number[i]]
-            for j in range(indptr[i], indptr[i + 1]):
-                if indices[j] < first and number[indices[j]] >= 0:
+                if indices[j] < n_standard and number[indices[j]] >= 0:
                     rows[place] = number[indices[j]]
-                    values[place] = data[j] * scale[number[i]] * scale[rows[place]]
+                    values[place] = data[j] * own_scale * scale[rows[place]]
                     place += 1
             for j in range(across_start[i], across_start[i + 1]):
-                rows[place] = count + across_column[j]
-                values[place] = across_value[j] * scale[number[i]] * scale[rows[place]]
+                g, at = across_group[j], across_place[j]
+                for c in range(first[g], first[g + 1]):
+                    rows[place] = count + c
+                    values[place] = side_value[at + c - first[g]] * own_scale * scale[count + c]
+                    place += 1
+            begin[number[i] + 1] = place
+    side_place, own_place = 0, 0
+    for g in range(len(first) - 1):
+        size = first[g + 1] - first[g]
+        for c in range(first[g], first[g + 1]):
+            own_scale = scale[count + c]
+            for k in range(side_start[g], side_start[g + 1]):
+                if side_row[k] < n_standard and number[side_row[k]] >= 0:
+                    entry = side_value[side_place + size * (k - side_start[g]) + c - first[g]]
+                    rows[place] = number[side_row[k]]
+                    values[place] = entry * own_scale * scale[rows[place]]
+                    place += 1
+            for k in range(back_start[c], back_start[c + 1]):
+                h, at = back_group[k], back_place[k]
+                if h < g:
+                    for column_h in range(first[h], first[h + 1]):
+                        rows[place] = count + column_h
+                        entry = own_value[at + column_h - first[h]]
+                        values[place] = entry * own_scale * scale[rows[place]]
+                        place += 1
+            for k in range(own_start[g], own_start[g + 1]):
+                entry = own_value[own_place + size * (k - own_start[g]) + c - first[g]]
+                rows[place] = count + own_column[k]
+                values[place] = entry * own_scale * scale[rows[place]]
                 place += 1
-    for c in range(m):
-        place = start[count + c]
-        for j in range(down_start[c], down_start[c + 1]):
-            if down_row[j] < first and number[down_row[j]] >= 0:
-                rows[place] = number[down_row[j]]
-                values[place] = down_value[j] * scale[count + c] * scale[rows[place]]
-                place += 1
-        for j in range(own_start[c], own_start[c + 1]):
-            rows[place] = count + own_column[j]
-            values[place] = own_value[j] * scale[count + c] * scale[rows[place]]
-            place += 1
+            begin[count + c + 1] = place
+        side_place += size * (side_start[g + 1] - side_start[g])
+        own_place += size * (own_start[g + 1] - own_start[g])
     entries = count + len(Z_column)
-    begin = zeros(n + 1, np.int32)
-    column, value = empty(entries, np.int32), empty(entries)
-    to = 0
+    basis_start, to = zeros(n + 1, np.int32), 0
+    column, entry_of_column = empty(entries, np.int32), empty(entries)
     for i in range(n):
-        if i < first and number[i] >= 0:
-            column[to], value[to] = number[i], scale[number[i]]
+        if i < n_standard and number[i] >= 0:
+            column[to], entry_of_column[to] = number[i], scale[number[i]]
             to += 1
         for k in range(Z_start[i], Z_start[i + 1]):
             column[to] = count + Z_column[k]
-            value[to] = Z_value[k] * scale[column[to]]
+            entry_of_column[to] = Z_value[k] * scale[column[to]]
             to += 1
-        begin[i + 1] = to
-    return (start, rows, values), (begin, column, value), energy
+        basis_start[i + 1] = to
+    return (begin, rows[:place], values[:place]), (basis_start, column, entry_of_column), energy
 
 
 @kernel
