@@ -232,7 +232,7 @@ def test_hole_whose_curve_is_not_known(size):
     assert [len(m) for m in messages] == [0, 1, 0]
     share = np.abs(K[1] - K[0]).max() / np.abs(K[0]).max()
     warned_share = float(messages[1][0].split("about ")[1].split()[0])
-    print(f"\nK changes by {share:.4f}, {warned_share:.4f} is warned_share")
+    print(f"\nK changes by {share:.4f}, {warned_share:.4f} is said")
     assert share > 2e-3
     assert warned_share == pytest.approx(share, rel=1 / 3)
     assert K[2] == pytest.approx(K[0], abs=2 * 2e-3 * np.abs(K[0]).max())
