@@ -19,6 +19,7 @@ from fuzz.kinds import (
     Seen,
     Whole,
     Word,
+    items_of,
     real,
 )
 from fuzz.scene_rules import SQUARE
@@ -48,6 +49,24 @@ def axis_sets(value):
     return (
         True if not value else value.keys() == {"a"} and {} != value and value["a"] in ([(0, 1)],)
     )
+
+
+def set_names(value):
+    """Whether a value is a facet set of the meshes here, or a list of such; of none is none asked.
+
+    Containers that have no order may be meant so.
+    """
+    if isinstance(value, str):
+        return value == "boundary"
+    items = items_of(value)
+    if items is None or not all(isinstance(v, str) and v == "boundary" for v in items):
+        return False
+    return True if items and isinstance(value, list | tuple) else None
+
+
+def sets_to_fit(value):
+    """The same, or yes or no."""
+    return None if isinstance(value, np.bool_) else isinstance(value, bool) or set_names(value)
 
 
 def _read_mesh(path, **named):
@@ -241,6 +260,18 @@ ENTRIES = [
     ),
     Entry("refine", xc.refine, {"mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh))}),
     Entry(
+        "fit_curves",
+        xc.fit_curves,
+        {
+            "mesh": arg(Of(type=xc.Mesh), Late(scenes.mesh), Late(lambda: scenes.mesh(3))),
+            "sets": arg(
+                Seen(rule=lambda v: v is ... or set_names(v)), None, "boundary", ["boundary"]
+            ),
+            "angle": arg(Number(above=0, below=90), 50.0, 30),
+        },
+        cost=0.02,
+    ),
+    Entry(
         "refine",
         lambda cells: xc.refine(scenes.mesh(), cells),
         {
@@ -274,6 +305,7 @@ ENTRIES = [
                 words=["mesh file", "triangles", "cell"],
             ),
             "strict": arg(Flag(), False, True),
+            "fit_curves": arg(Seen(rule=sets_to_fit), True, ["boundary"]),
         },
         in_folder=True,
     ),
@@ -291,6 +323,7 @@ ENTRIES = [
             "step": arg(Seen(rule=step_of_deck), None, 1, "Step-1", words=["step"]),
             "time": arg(Number(optional=True, least=0), None, 0.5),
             "ignore": arg(ListOf(item=Word()), (), ["TIE"], words=["ignore"]),
+            "fit_curves": arg(Seen(rule=sets_to_fit), True, ["boundary"]),
         },
         in_folder=True,
     ),

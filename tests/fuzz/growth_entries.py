@@ -306,6 +306,7 @@ ENTRIES = [
             ),
             "reuse": arg(Of(type=SolverState), SolverState()),
             "load_factor": arg(Number(above=0), 1.0, 2.0),
+            "has_known_bars": arg(Flag(), False, True),
         },
     ),
     Entry(
@@ -327,6 +328,7 @@ ENTRIES = [
             "reuse": arg(Of(type=SolverState, optional=True), None, SolverState()),
             "bars": arg(Flag(), False, True),
             "solver": arg(Called(optional=True), None),
+            "known_bars": arg(Called(optional=True), None),
         },
         cost=0.08,
     ),

@@ -159,12 +159,12 @@ def test_tube_in_cells(order, cells):
     assert cells[0] - 1e-12 <= space.tips[0].radius / size <= cells[1] + 1e-12
 
 
-@pytest.mark.parametrize(("order", "few", "many"), [(1, 6, 7), (2, 5, 6)])
+@pytest.mark.parametrize(("order", "few", "many"), [(1, 6, 7), (2, 7, 8)])
 def test_choice_of_the_solver(order, few, many):
-    """A factorisation up to 4 000 unknowns, at order 2 up to 8 000."""
-    bound = {1: 4_000, 2: 8_000}[order]
+    """A factorisation up to 4 000 unknowns, at order 2 up to 15 000 of what is solved once."""
+    bound = {1: 4_000, 2: 15_000}[order]
     small, large = (xc.solve(replace(tilted(n), order=order)) for n in (few, many))
-    assert small.n_dof < bound < large.n_dof < 1.2 * bound
+    assert small.n_dof < bound < large.n_dof < 1.3 * bound
     assert small.report.operations["factorisations"] == 1
     assert large.report.operations["factorisations"] == 0
 

@@ -93,6 +93,7 @@ class Response:
                 f"Response: reuse = {value_text(self.reuse)}: give that of a Response."
             )
         number(self.load_factor, "Response: load_factor", above=0)
+        flag(self.has_known_bars, "Response: has_known_bars")
         counts = {len(self.states), len(self.sif), len(self.solutions or self.sif)}
         if len(counts) > 1:
             raise ProblemError(
@@ -226,10 +227,11 @@ def respond(
     states, bars = entries(states, "respond: states"), flag(bars, "respond: bars")
     if not states:
         raise ProblemError("respond: states is empty: give one load state, at least.")
-    if solver is not None and not callable(solver):
-        raise ProblemError(
-            f"respond: solver = {value_text(solver)} cannot be called: give a function."
-        )
+    for name, function in (("solver", solver), ("known_bars", known_bars)):
+        if function is not None and not callable(function):
+            raise ProblemError(
+                f"respond: {name} = {value_text(function)} cannot be called: give a function."
+            )
     plane = problem.mesh.dim < 3  # of fronts, the bars need no factor
     new_solutions = solve_states(
         problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
