@@ -50,6 +50,8 @@ def test_only_the_sets_that_are_named():
     assert set(xc.fit_curves(ring(12), ["rim"]).curves) == {"rim"}
     with pytest.raises(xc.ProblemError, match="no facet set 'bore'"):
         xc.fit_curves(ring(12), "bore")
+    with pytest.raises(xc.MeshError, match=r"sets = .*: give names of facet sets"):
+        xc.fit_curves(ring(12), [["hole"]])
 
 
 def test_an_angle_decides_what_a_corner_is():

@@ -101,6 +101,7 @@ def test_a_part_of_a_set_of_any_mesh():
 WRONG = {
     "crosses itself near": {"outline": [(0, 0), (1, 1), (1, 0), (0, 1)]},
     "of an arc lie on one line": {"outline": [(0, 0), ((1, 0), (2, 0)), (1, 1)]},
+    "encloses nothing": {"outline": [(0, 0), (4, 4)]},
     "comes twice, one after the other": {"outline": [(0, 0), (0, 0), (1, 1)]},
     "outline = .* holds str entries": {"outline": "square"},
     "not both": {"outline": [(0, 0), (1, 0), (0, 1)], "width": 3.0},

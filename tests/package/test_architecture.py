@@ -234,9 +234,9 @@ def test_help_shows_names_and_defaults_and_leaves_types_to_the_docstring() -> No
     )
 
 
-@pytest.mark.parametrize("name", ["grow", "resume"])
+@pytest.mark.parametrize("name", ["grow", "resume", "run"])
 def test_an_unknown_option_is_refused_by_the_name_of_the_function(name: str) -> None:
-    positional = [None] * (4 + (name == "resume"))
+    positional = {"grow": [None] * 4, "resume": [None] * 5, "run": ["case.toml"]}[name]
     with pytest.raises(TypeError, match=rf"^{name}\(\) got an unexpected keyword argument 'dA'$"):
         getattr(xcrack, name)(*positional, dA=1.0)
 

@@ -17,7 +17,7 @@ from xcrack.fatigue.criteria import Criterion
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.law import Law
 from xcrack.fatigue.spectrum import Spectrum
-from xcrack.growth.options import GrowthOptions, lists_options
+from xcrack.growth.options import GrowthOptions, lists_options, refuse_unknown_options
 from xcrack.growth.run import grow
 from xcrack.model.problem import Problem
 from xcrack.output.vtk import write
@@ -91,6 +91,7 @@ def run(
         return _run_in(
             path, (problem, law, criterion, cycle, da), options_of_collect, overwrite, options
         )
+    refuse_unknown_options("run", options)
     growth_arguments = {
         "law": law,
         "criterion": criterion,

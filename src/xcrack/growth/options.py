@@ -1,7 +1,7 @@
 """Options of `grow`: they stand here once, their defaults on `GrowthRule` alone."""
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from numbers import Real
 from typing import Annotated, Any, TypedDict, TypeVar, cast
@@ -331,10 +331,15 @@ def run_of(
     ProblemError
         One that does not fit.
     """
+    refuse_unknown_options(caller, options)
+    return GrowthRule(problem, law, criterion, cycle, da, **options)
+
+
+def refuse_unknown_options(caller: str, options: Iterable[str]) -> None:
+    """Raise a TypeError in the words of Python for a name that is no option of `grow`."""
     for name in options:
         if name not in GrowthOptions.__annotations__:
             raise TypeError(f"{caller}() got an unexpected keyword argument {name!r}")
-    return GrowthRule(problem, law, criterion, cycle, da, **options)
 
 
 def lists_options(function: AnyFunction) -> AnyFunction:
@@ -351,4 +356,4 @@ def lists_options(function: AnyFunction) -> AnyFunction:
     return function
 
 
-__all__ = ["GrowthOptions", "GrowthRule", "lists_options", "run_of"]
+__all__ = ["GrowthOptions", "GrowthRule", "lists_options", "refuse_unknown_options", "run_of"]

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from xcrack.base.arguments import CheckedBy, Error, Number, Part, check_arguments
 from xcrack.base.arrays import Floats, Ints, at
-from xcrack.base.checks import entries, flag
+from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import MeshError, warn
 from xcrack.mesh.curved_facets import raised_lattice, with_curves
 from xcrack.mesh.mesh import Mesh, facet_set, numbers_of
@@ -35,7 +35,10 @@ _LEAST = 1e-9  # of the size of a fit: what neighbours do not decide is left out
 
 def _set_names(value: Any, label: str, error: Error) -> tuple[str, ...]:
     """Names of one facet set or several."""
-    return (value,) if isinstance(value, str) else entries(value, label, error=error)
+    names = (value,) if isinstance(value, str) else entries(value, label, error=error)
+    if not all(isinstance(name, str) for name in names):
+        raise error(f"{label} = {value_text(value)}: give names of facet sets.")
+    return names
 
 
 @check_arguments(MeshError)

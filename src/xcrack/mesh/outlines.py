@@ -149,8 +149,8 @@ def sides_of(outline: Any) -> list[Side]:
         stop = sides[0].start if _is_first(sides, end, size) else (float(end[0]), float(end[1]))
         sides.append(Side(first, stop, center, turn, f"arc_{n}" if center else "", n))
         start = end
-    if len(sides) < 2:
-        raise GeometryError("outline: one side encloses nothing: give two arcs or three sides.")
+    if len(sides) < (2 if any(side.center for side in sides) else 3):
+        raise GeometryError("outline: it encloses nothing: give an arc and a side, or three sides.")
     polygon = polygon_of(sides)
     crossing = self_crossing(polygon)
     if crossing is not None:
