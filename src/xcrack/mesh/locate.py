@@ -69,16 +69,27 @@ def places_in_body(mesh: Mesh, x: Floats, label: str) -> tuple[Ints, Floats]:
         cell[rows], feet = nearest_on_boundary(mesh, x[rows])
         place = np.maximum(barycentric(mesh, cell[rows], feet), 0.0)
         bary[rows] = place / place.sum(axis=1, keepdims=True)
-    ends = np.concatenate([np.repeat(np.arange(mesh.n_points)[:, None], 2, axis=1), mesh.edges])
-    ends_of_node = ends[nodes]
-    is_node = np.linalg.norm(mesh.points[ends_of_node].mean(axis=1) - x, axis=1) <= (
-        _AT_NODE * mesh.cell_size[cell]
-    )
-    for k in np.nonzero(is_node)[0]:
-        has_ends = (mesh.cells[:, :, None] == ends_of_node[k]).any(axis=1).all(axis=1)
-        cell[k] = int(np.argmax(has_ends))
-        bary[k] = (mesh.cells[cell[k]][:, None] == ends_of_node[k]).mean(axis=1)
+    node_points = np.concatenate([mesh.points, mesh.edge_middles])[nodes]
+    is_near = np.linalg.norm(node_points - x, axis=1) <= _AT_NODE * mesh.cell_size[cell]
+    is_point = is_near & (nodes < mesh.n_points)
+    cell[is_point], bary[is_point] = cells_of_points(mesh, nodes[is_point])
+    is_middle = is_near & ~is_point
+    if is_middle.any():
+        edge = nodes[is_middle] - mesh.n_points
+        cell_of_edge = np.empty(len(mesh.edges), dtype=np.int64)
+        cell_of_edge[mesh.cell_to_edge] = np.arange(len(mesh.cells))[:, None]
+        cell[is_middle] = cell_of_edge[edge]
+        corners = mesh.cells[cell[is_middle]]
+        bary[is_middle] = (corners[:, :, None] == mesh.edges[edge][:, None]).mean(axis=2)
     return cell, bary
+
+
+def cells_of_points(mesh: Mesh, number: Ints) -> tuple[Ints, Floats]:
+    """A cell of each mesh point `(k,)`, and its barycentric coordinates `(k, d + 1)`."""
+    cell_of_point = np.empty(mesh.n_points, dtype=np.int64)
+    cell_of_point[mesh.cells] = np.arange(len(mesh.cells))[:, None]
+    cell = cell_of_point[number]
+    return cell, (mesh.cells[cell] == number[:, None]).astype(float)
 
 
 def nearest_on_boundary(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:

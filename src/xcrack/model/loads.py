@@ -29,7 +29,7 @@ from xcrack.base.units import (
     TEMPERATURE,
 )
 from xcrack.mesh.holes import RoundHole, round_hole
-from xcrack.mesh.locate import places_in_body
+from xcrack.mesh.locate import cells_of_points, places_in_body
 from xcrack.mesh.mesh import Mesh, facet_set
 from xcrack.model.material import Material
 from xcrack.model.values import (
@@ -663,10 +663,7 @@ class line_force(Load):  # noqa: N801
     def point_forces(self, mesh: Mesh) -> tuple[Ints, Floats, Floats]:
         """Forces at the points of the edge; the rule is exact up to cubic f N."""
         number, force = self._nodal_forces(mesh)
-        cell_of_point = np.empty(mesh.n_points, dtype=np.int64)
-        cell_of_point[mesh.cells] = np.arange(len(mesh.cells))[:, None]
-        cell = cell_of_point[number]
-        return cell, (mesh.cells[cell] == number[:, None]).astype(float), force
+        return *cells_of_points(mesh, number), force
 
     def _nodal_forces(self, mesh: Mesh) -> tuple[Ints, Floats]:
         """Mesh points, and the forces at them."""
