@@ -9,7 +9,7 @@ import xcrack as xc
 
 
 @dataclass(frozen=True)
-class ByModuli(xc.Material):
+class BulkAndShear(xc.Material):
     """Isotropic, by bulk and shear modulus."""
 
     bulk: float
@@ -48,7 +48,7 @@ class Orthotropic(xc.Material):
 
 
 K, G = 175e3, 80.8e3
-STEEL = ByModuli(K, G, "strain")
+STEEL = BulkAndShear(K, G, "strain")
 SAME = xc.Isotropic(9 * K * G / (3 * K + G), (3 * K - 2 * G) / (6 * K + 2 * G), "strain")
 PLY = Orthotropic((140e3, 10e3, 8e3), (3e3, 5e3, 5e3), (0.4, 0.3, 0.3), angle=0.7)
 
@@ -270,7 +270,7 @@ def test_a_material_is_in_files_reports_and_pictures(tmp_path):
     solution = xc.solve(edge_crack(STEEL))
     saved = xc.load(xc.save(solution, tmp_path / "solution"))
     assert saved.problem.material == STEEL
-    assert isinstance(saved.problem.material, ByModuli)
+    assert isinstance(saved.problem.material, BulkAndShear)
     x = np.array([[3.3, 1.7], [15.1, -4.0]])
     assert np.array_equal(saved.stress(x), solution.stress(x))
     grown(STEEL, 2, tmp_path / "run")
@@ -300,7 +300,7 @@ points = [[0.0, 0.3], [6.0, 0.3]]
 
 def test_a_material_is_read_from_a_case_file(tmp_path):
     case = tmp_path / "case.toml"
-    case.write_text(CASE.format(material='kind = "ByModuli"\nbulk = 175e3\nshear = 80.8e3'))
+    case.write_text(CASE.format(material='kind = "BulkAndShear"\nbulk = 175e3\nshear = 80.8e3'))
     assert xc.read_case(case).problem.material == STEEL
     case.write_text(CASE.format(material='kind = "Isotropic"\nE = 210e3\nnu = 0.3'))
     assert xc.read_case(case).problem.material == xc.Isotropic(210e3, 0.3, "strain")
