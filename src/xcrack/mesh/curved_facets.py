@@ -298,7 +298,7 @@ def outline_gain(mesh: Mesh, facets: Ints) -> float:
     inner_corner = facets[:, [2, 1, 0]].ravel()
     gain = 0.0
     for side, curve in sides:
-        edges = np.unique(np.sort(side[:, local_edges(2)].reshape(-1, 2), axis=1), axis=0)
+        edges = edges_of(side)
         on_curve = rows_of(edges, np.sort(corner, axis=1), mesh.n_points)[1]
         start, end = mesh.points[corner[on_curve]].transpose(1, 0, 2)
         to_edge = (start + end) / 2 - mesh.points[inner_corner[on_curve]]
@@ -375,21 +375,37 @@ def _smooth_sides(mesh: Mesh, facets: Ints, curve: CurvedFacets) -> Ints:
     """Number of the smooth side that each curved facet belongs to `(k,)`."""
     d, count = mesh.dim, len(facets)
     owner = np.tile(np.arange(count), d)
-    # Where facets meet: at points in 2D, at edges in 3D, one row for each.
-    joints = facets[:, [[0], [1]]] if d == 2 else facets[:, local_edges(2)]
-    key = np.sort(np.concatenate(list(joints.transpose(1, 0, 2))), axis=1)
     bary = np.eye(2) if d == 2 else 0.5 * (1 - np.eye(3))[::-1]
     normal = _outward_normals(mesh, facets, curve, owner, np.repeat(bary, count, axis=0))
+    a, b = ridges(facets)
+    is_smooth = np.einsum("jd,jd->j", normal[a], normal[b]) > _SHARP
+    return sides_of_facets(count, owner[a[is_smooth]], owner[b[is_smooth]])
+
+
+def edges_of(facets: Ints) -> Ints:
+    """Pairs of points between which facets `(k, d)` have an edge `(e, 2)`, smaller first."""
+    pairs = facets[:, local_edges(facets.shape[1] - 1)].reshape(-1, 2)
+    return np.unique(np.sort(pairs, axis=1), axis=0)
+
+
+def ridges(facets: Ints) -> tuple[Ints, Ints]:
+    """Where two facets `(k, d)` meet, at points in 2D, at edges in 3D: their numbers there.
+
+    Number ``j k + i`` is ridge j of facet i: its point j, or its edge j of `local_edges`.
+    """
+    d = facets.shape[1]
+    points = facets[:, [[0], [1]]] if d == 2 else facets[:, local_edges(2)]
+    key = np.sort(np.concatenate(list(points.transpose(1, 0, 2))), axis=1)
     _, group, members = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(group.ravel(), kind="stable")
     begin = np.concatenate([[0], np.cumsum(members)])[:-1][members == 2]
-    a, b = order[begin], order[begin + 1]
-    is_smooth = np.einsum("jd,jd->j", normal[a], normal[b]) > _SHARP
-    links = (np.ones(int(is_smooth.sum())), (owner[a[is_smooth]], owner[b[is_smooth]]))
-    return np.asarray(
-        connected_components(coo_array(links, shape=(count, count)), directed=False)[1],
-        dtype=np.int64,
-    )
+    return order[begin], order[begin + 1]
+
+
+def sides_of_facets(count: int, a: Ints, b: Ints) -> Ints:
+    """Number of the side of each facet `(count,)`, where facets a and b go on smoothly `(j,)`."""
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def _outward_normals(
@@ -448,6 +464,6 @@ def _groups_without_conflict(conflicts: Bools, sides: Ints, sizes: Ints) -> list
 
 
 __all__ = [
-    "CurvedFacets", "Lattice", "lattice", "outline_gain", "raised_lattice", "rows_of",
-    "with_curves",
+    "CurvedFacets", "Lattice", "edges_of", "lattice", "outline_gain", "raised_lattice", "ridges",
+    "rows_of", "sides_of_facets", "with_curves",
 ]  # fmt: skip

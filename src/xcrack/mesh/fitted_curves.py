@@ -8,18 +8,22 @@ approximation) is exact at any distance d.
 """
 
 from collections.abc import Sequence
-from itertools import combinations
 from typing import Annotated, Any
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csr_array
 
 from xcrack.base.arguments import CheckedBy, Error, Number, Part, check_arguments
 from xcrack.base.arrays import Floats, Ints, at
 from xcrack.base.checks import entries, flag, value_text
 from xcrack.base.errors import MeshError, warn
-from xcrack.mesh.curved_facets import raised_lattice, with_curves
+from xcrack.mesh.curved_facets import (
+    edges_of,
+    raised_lattice,
+    ridges,
+    sides_of_facets,
+    with_curves,
+)
 from xcrack.mesh.mesh import Mesh, facet_set, numbers_of
 from xcrack.mesh.simplex import outward_areas
 
@@ -102,10 +106,8 @@ def with_fitted_curves(mesh: Mesh, sets: bool | str | Sequence[str], source: str
     source : str
         Name of the file, for the message.
     """
-    if sets is True:
-        return fit_curves(mesh)
     if sets:
-        return fit_curves(mesh, sets)
+        return fit_curves(mesh, None if sets is True else sets)
     warn_of_chords(mesh, source, float(np.radians(_COARSE)), "Read with fit_curves=True it has")
     return mesh
 
@@ -129,7 +131,7 @@ def warn_of_chords(mesh: Mesh, label: str, least_turn: float, remedy: str) -> No
         facets = facets[~np.isin(numbers_of(mesh, facets), np.concatenate(curved_numbers))]
     if not len(facets):
         return
-    cosine = _cosines(_facet_normals(mesh, facets), *_joints(facets))
+    cosine = _cosines(_facet_normals(mesh, facets), *_neighbours(facets))
     if not ((cosine > np.cos(np.radians(_ANGLE))) & (cosine < np.cos(least_turn / 2))).any():
         return
     pairs, offset = _arcs(mesh, facets, _ANGLE)
@@ -155,7 +157,7 @@ def _arcs(mesh: Mesh, facets: Ints, angle: float) -> tuple[Ints, Floats]:
         np.stack([np.repeat(side, mesh.dim), facets.ravel()], axis=1), axis=0, return_inverse=True
     )
     corner = node.reshape(facets.shape)
-    edges = _edges(corner)
+    edges = edges_of(corner)
     x = mesh.points[key[:, 1]]
     normals = _normals(x, _ring(edges, len(x)), _mean_normals(corner, normal, len(x)))
     return _at_shared_edges(key[edges, 1], *_heights(x, normals, edges))
@@ -166,12 +168,6 @@ def _facet_normals(mesh: Mesh, facets: Ints) -> Floats:
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
 
 
-def _edges(corner: Ints) -> Ints:
-    """Pairs of points of facets that have an edge in common `(e, 2)`, smaller first."""
-    pairs = [corner[:, list(pair)] for pair in combinations(range(corner.shape[1]), 2)]
-    return np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
-
-
 def _labels(mesh: Mesh, facets: Ints) -> Ints:
     """A number for each facet `(k,)`, the same where they are in the same sets."""
     number = numbers_of(mesh, facets)
@@ -179,17 +175,10 @@ def _labels(mesh: Mesh, facets: Ints) -> Ints:
     return np.unique(np.array(members), axis=1, return_inverse=True)[1].ravel()
 
 
-def _joints(facets: Ints) -> tuple[Ints, Ints]:
-    """Pairs of facets `(j,)` that meet at an edge, or at a point in 2D."""
-    count, d = facets.shape
-    joints = np.concatenate([facets[:, list(c)] for c in combinations(range(d), d - 1)])
-    owner = np.tile(np.arange(count), d)
-    _, group, members = np.unique(
-        np.sort(joints, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    order = np.argsort(group.ravel(), kind="stable")
-    first = np.concatenate([[0], np.cumsum(members)])[:-1][members == 2]
-    return owner[order[first]], owner[order[first + 1]]
+def _neighbours(facets: Ints) -> tuple[Ints, Ints]:
+    """Pairs of facets that meet `(j,)`."""
+    a, b = ridges(facets)
+    return a % len(facets), b % len(facets)
 
 
 def _cosines(normal: Floats, a: Ints, b: Ints) -> Floats:
@@ -202,11 +191,9 @@ def _sides(facets: Ints, normal: Floats, label: Ints, angle: float) -> Ints:
 
     Where sets divide the boundary a curve may end, as where a straight side goes on.
     """
-    a, b = _joints(facets)
+    a, b = _neighbours(facets)
     is_smooth = (label[a] == label[b]) & (_cosines(normal, a, b) > np.cos(np.radians(angle)))
-    links = (np.ones(int(is_smooth.sum())), (a[is_smooth], b[is_smooth]))
-    graph = coo_array(links, shape=(len(facets),) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    return sides_of_facets(len(facets), a[is_smooth], b[is_smooth])
 
 
 def _ring(edges: Ints, count: int) -> tuple[Ints, Ints]:
