@@ -11,7 +11,7 @@ from xcrack.base.arrays import Floats, Ints, at, coordinates
 from xcrack.crack.crack import Crack
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.mesh.curved_facets import outline_gain
-from xcrack.mesh.mesh import Mesh, facet_set, nearest_nodes, nearest_point
+from xcrack.mesh.mesh import Mesh, facet_set, supported_nodes
 from xcrack.mesh.simplex import outward_areas
 from xcrack.model.loads import Load, Support
 from xcrack.model.material import von_mises
@@ -229,12 +229,9 @@ def _moved_points(solutions: Sequence[Solution], support: Support) -> list[Alarm
     mesh = solutions[0].space.mesh
     if support.place is None or isinstance(support.place, str):
         return []
-    x = np.atleast_2d(np.asarray(support.place))
-    if np.ndim(support.place) == 1:
-        nodes = mesh.points[[nearest_point(mesh, x[0], support.kind)]]
-    else:
-        all_nodes = np.concatenate([mesh.points, mesh.edge_middles])
-        nodes = all_nodes[nearest_nodes(mesh, x, support.kind)]
+    x = np.asarray(support.place)
+    all_nodes = np.concatenate([mesh.points, mesh.edge_middles])
+    nodes = all_nodes[supported_nodes(mesh, x, support.kind)]
     distance = np.linalg.norm(nodes - x, axis=1) / mesh.extent
     k = int(np.argmax(distance))
     if distance[k] <= _HELD_ELSEWHERE or not any(_has_reaction(s, support) for s in solutions):

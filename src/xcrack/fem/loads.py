@@ -12,7 +12,7 @@ from xcrack.fem.assembly import MeshLoad
 from xcrack.fem.facets import LipPoints, jump_values, part_points
 from xcrack.fem.function_space import FunctionSpace
 from xcrack.fem.quadrature import Points, at_joints, cell_points, cell_side
-from xcrack.mesh.mesh import facet_set, nearest_nodes, nearest_point, numbers_of
+from xcrack.mesh.mesh import facet_set, numbers_of, supported_nodes
 from xcrack.mesh.simplex import facet_nodes
 from xcrack.model.elasticity import Elasticity
 from xcrack.model.loads import FacetPoints, Load, Support
@@ -348,10 +348,7 @@ def _set_nodes(space: FunctionSpace, where: object, label: str) -> Ints:
     if isinstance(where, str):
         facets = facet_set(space.mesh, where, label)
         return np.unique(facet_nodes(space.mesh, space.order, facets))
-    x = np.asarray(where)
-    if x.ndim == 1:
-        return np.array([nearest_point(space.mesh, x, label)])
-    number = nearest_nodes(space.mesh, x, label)
+    number = supported_nodes(space.mesh, np.asarray(where), label)
     if space.order == 1:  # the ends of an edge hold its middle
         is_middle = number >= space.mesh.n_points
         ends = space.mesh.edges[number[is_middle] - space.mesh.n_points]

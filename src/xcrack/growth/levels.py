@@ -15,7 +15,13 @@ from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.response import KnownBars, Response, checked_response, respond
+from xcrack.growth.response import (
+    KnownBars,
+    Response,
+    checked_response,
+    respond,
+    with_known_bars,
+)
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem
 from xcrack.sif.sif import SIF
@@ -344,12 +350,7 @@ def _from_elsewhere(
         )
         return checked_response(result, problem, states)
 
-    if bars and known_bars is not None:
-        response = response_with(False)
-        sif = known_bars(response.sif)
-        if sif is not None:
-            return replace(response, sif=sif, has_known_bars=True)
-    return response_with(bars)
+    return with_known_bars(response_with, bars, known_bars)
 
 
 def respond_under_program(

@@ -5,7 +5,6 @@ that solves. Another one takes K from a handbook, a table or a test.
 """
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -237,28 +236,37 @@ def respond(
         problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
     )
     handed_on = new_solutions[0].reuse
-    asks_first = bars and known_bars is not None
-    messages: list[str] = []
-    with collected_warnings(messages) if asks_first else nullcontext():
-        by_crack = [
-            stress_intensities(new_solutions, c, bars and not asks_first)
-            for c in range(len(problem.cracks))
-        ]
-    sif = tuple(zip(*by_crack, strict=True))
-    sif_with_bars = known_bars(sif) if bars and known_bars is not None else None
-    if sif_with_bars is not None:
-        sif = sif_with_bars
-        for message in messages:
-            warn(message)
-    elif asks_first:
-        by_crack = [stress_intensities(new_solutions, c, True) for c in range(len(by_crack))]
-        sif = tuple(zip(*by_crack, strict=True))
     light = handed_on.without_factor()
     solutions = tuple(copy_without_checks(s, reuse=light, factored=None) for s in new_solutions)
-    return build_without_checks(
-        Response, states=states, sif=sif, solutions=solutions, reuse=handed_on,
-        has_known_bars=sif_with_bars is not None,
-    )  # fmt: skip
+
+    def response_with(bars: bool) -> Response:
+        by_crack = [stress_intensities(new_solutions, c, bars) for c in range(len(problem.cracks))]
+        sif = tuple(zip(*by_crack, strict=True))
+        return build_without_checks(
+            Response, states=states, sif=sif, solutions=solutions, reuse=handed_on
+        )
+
+    return with_known_bars(response_with, bars, known_bars)
+
+
+def with_known_bars(
+    response_with: Callable[[bool], Response], bars: bool, known_bars: KnownBars | None
+) -> Response:
+    """A response whose bars are known beforehand, or found; by a function of whether it has bars.
+
+    Where they are found after all, warnings of K without them are not said twice.
+    """
+    if not bars or known_bars is None:
+        return response_with(bars)
+    messages: list[str] = []
+    with collected_warnings(messages):
+        response = response_with(False)
+    sif = known_bars(response.sif)
+    if sif is None:
+        return response_with(True)
+    for message in messages:
+        warn(message)
+    return copy_without_checks(response, sif=sif, has_known_bars=True)
 
 
 def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> Response:
@@ -283,4 +291,13 @@ def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> 
     return response
 
 
-__all__ = ["Answers", "KnownBars", "Respond", "Response", "best_K", "checked_response", "respond"]
+__all__ = [
+    "Answers",
+    "KnownBars",
+    "Respond",
+    "Response",
+    "best_K",
+    "checked_response",
+    "respond",
+    "with_known_bars",
+]

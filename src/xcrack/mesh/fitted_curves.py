@@ -131,7 +131,7 @@ def warn_of_chords(mesh: Mesh, label: str, least_turn: float, remedy: str) -> No
         facets = facets[~np.isin(numbers_of(mesh, facets), np.concatenate(curved_numbers))]
     if not len(facets):
         return
-    cosine = _cosines(_facet_normals(mesh, facets), *_neighbours(facets))
+    cosine = _neighbours(facets, _facet_normals(mesh, facets))[2]
     if not ((cosine > np.cos(np.radians(_ANGLE))) & (cosine < np.cos(least_turn / 2))).any():
         return
     pairs, offset = _arcs(mesh, facets, _ANGLE)
@@ -175,15 +175,10 @@ def _labels(mesh: Mesh, facets: Ints) -> Ints:
     return np.unique(np.array(members), axis=1, return_inverse=True)[1].ravel()
 
 
-def _neighbours(facets: Ints) -> tuple[Ints, Ints]:
-    """Pairs of facets that meet `(j,)`."""
-    a, b = ridges(facets)
-    return a % len(facets), b % len(facets)
-
-
-def _cosines(normal: Floats, a: Ints, b: Ints) -> Floats:
-    """Of the angles between the normals of facets `(j,)`."""
-    return np.asarray(np.einsum("jd,jd->j", normal[a], normal[b]))
+def _neighbours(facets: Ints, normal: Floats) -> tuple[Ints, Ints, Floats]:
+    """Pairs of facets that meet `(j,)`, and the cosines of the turns between them."""
+    a, b = (ridge % len(facets) for ridge in ridges(facets))
+    return a, b, np.einsum("jd,jd->j", normal[a], normal[b])
 
 
 def _sides(facets: Ints, normal: Floats, label: Ints, angle: float) -> Ints:
@@ -191,8 +186,8 @@ def _sides(facets: Ints, normal: Floats, label: Ints, angle: float) -> Ints:
 
     Where sets divide the boundary a curve may end, as where a straight side goes on.
     """
-    a, b = _neighbours(facets)
-    is_smooth = (label[a] == label[b]) & (_cosines(normal, a, b) > np.cos(np.radians(angle)))
+    a, b, cosine = _neighbours(facets, normal)
+    is_smooth = (label[a] == label[b]) & (cosine > np.cos(np.radians(angle)))
     return sides_of_facets(len(facets), a[is_smooth], b[is_smooth])
 
 

@@ -23,6 +23,11 @@ def barycentric(mesh: Mesh, cell: Ints, x: Floats) -> Floats:
     )
 
 
+def points_at(mesh: Mesh, cell: Ints, bary: Floats) -> Floats:
+    """Points `(k, d)` at places in cells `(k,)`: what `barycentric` undoes."""
+    return np.einsum("kv,kvd->kd", bary, mesh.points[mesh.cells[cell]])
+
+
 def locate(mesh: Mesh, x: Floats) -> tuple[Ints, Floats]:
     """Cell of each point `(k,)`, -1 outside, and its barycentric coordinates `(k, d + 1)`.
 

@@ -536,4 +536,15 @@ def nearest_nodes(mesh: Mesh, x: Floats, label: str) -> Ints:
     return np.asarray(number, dtype=np.int64)
 
 
+def supported_nodes(mesh: Mesh, place: Floats, label: str) -> Ints:
+    """Numbers of what a support at a point `(d,)` or at several `(k, d)` holds.
+
+    Of a point it is the nearest mesh point, of several each may be the middle of an edge too, as of
+    `nearest_nodes`.
+    """
+    if place.ndim == 1:
+        return np.array([nearest_point(mesh, place, label)])
+    return nearest_nodes(mesh, place, label)
+
+
 __all__ = []

@@ -9,6 +9,7 @@ from xcrack.analysis.solution import Solution
 from xcrack.base.arrays import Bools, Floats, Ints
 from xcrack.base.checks import numbers, value_text
 from xcrack.base.errors import ProblemError, XcrackError
+from xcrack.mesh.locate import points_at
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints
 from xcrack.output.curved_sides import CurvedSides
@@ -443,7 +444,7 @@ def load_arrows(solution: Solution) -> tuple[Floats, Floats]:
         sign = np.sign(factor)
         if "point_force" in load.acts:
             cell, bary, force = load.point_forces(mesh)
-            x = np.einsum("kv,kvd->kd", bary, mesh.points[mesh.cells[cell]])
+            x = points_at(mesh, cell, bary)
             rows = [x, sign * force, np.zeros_like(force)]
             forces.append(np.stack(rows, axis=1))
         if "traction" not in load.acts:

@@ -8,6 +8,7 @@ import numpy as np
 from xcrack.base.arguments import FileName
 from xcrack.base.arrays import Floats, Ints
 from xcrack.base.markup import rim
+from xcrack.mesh.locate import points_at
 from xcrack.mesh.mesh import Mesh
 from xcrack.model.loads import FacetPoints, Load
 from xcrack.model.problem import Problem
@@ -129,7 +130,7 @@ def _arrows_of(load: Load, mesh: Mesh) -> Iterator[tuple[Floats, Floats]]:
     """Places and vectors of a load; of a small set one, its resultant."""
     if "point_force" in load.acts:
         cell, bary, force = load.point_forces(mesh)
-        x = np.einsum("kv,kvd->kd", bary, mesh.points[mesh.cells[cell]])
+        x = points_at(mesh, cell, bary)
         yield from zip(x, force, strict=True)
     if "traction" not in load.acts:
         return
