@@ -286,20 +286,23 @@ def rim_shape(solutions: Sequence[Solution], z: Floats) -> tuple[Floats, Floats]
         x = position(solutions[0].space, points.cell, points.bary)
         offset = np.einsum("qd,qd->q", np.asarray(curve(x)) - x, normal)
         shape_terms -= _boundary_changes(solutions, z, points, offset)
-    chords = _chords(mesh)
-    is_curved = chords.turn != 0
+    facets, legs, turn = _chords(mesh)
+    is_curved = turn != 0
     if sides:
-        curved_numbers = mesh.facet_numbers(np.concatenate([facets for facets, _ in sides]))
-        is_curved &= ~np.isin(mesh.facet_numbers(chords.facets), curved_numbers)
+        curved_numbers = mesh.facet_numbers(np.concatenate([side for side, _ in sides]))
+        is_curved &= ~np.isin(mesh.facet_numbers(facets), curved_numbers)
     if not is_curved.any():
         return shape_terms, np.zeros_like(shape_terms)
-    points, _ = facet_points(solutions[0].space, chords.facets[is_curved], 3)
+    facets, legs, turn = facets[is_curved], legs[is_curved], turn[is_curved]
+    points, _ = facet_points(solutions[0].space, facets, 3)
     row_of_cell = np.zeros(len(mesh.cells), dtype=np.int64)
-    row_of_cell[mesh.facet_to_cell[mesh.facet_numbers(chords.facets[is_curved]), 0]] = (
-        is_curved.nonzero()[0]
-    )
+    row_of_cell[mesh.facet_to_cell[mesh.facet_numbers(facets), 0]] = np.arange(len(facets))
+    row = row_of_cell[points.cell]
     x = position(solutions[0].space, points.cell, points.bary)
-    offset = chords.heights(x, row_of_cell[points.cell])
+    # An arc that turns by t over a chord of length L is t a b / 2 L high, a and b from its ends.
+    to_ends = np.linalg.norm(x[:, None] - legs[row], axis=2).prod(axis=1)
+    length = np.linalg.norm(legs[row, 1] - legs[row, 0], axis=1)
+    offset = turn[row] / 2 * to_ends / length
     return shape_terms, -_boundary_changes(solutions, z, points, offset)
 
 
@@ -364,35 +367,12 @@ def _products(
     return result
 
 
-@dataclass(frozen=True, eq=False)
-class _Chords:
-    """Straight legs of the boundary of a mesh in 2D, the body on their left.
+def _chords(mesh: Mesh) -> tuple[Ints, Floats, Floats]:
+    """Facets of the boundary in 2D, ends of their legs `(k, 2, 2)`, and turns between legs.
 
-    Attributes
-    ----------
-    facets : (k, 2) array of int
-    begin, direction : (k, 2) arrays
-        Where the leg of each facet begins, and its unit direction.
-    length : (k,) array, length
-        Of the leg: facets that lie in one line are one leg.
-    turn : (k,) array, rad
-        Of the boundary from leg to leg, where they look like chords of a curve; elsewhere 0.
+    Facets in one line are one leg. Turns (rad, `(k,)`) are those between legs that look like chords
+    of a curve, outward where positive; 0 elsewhere.
     """
-
-    facets: Ints
-    begin: Floats
-    direction: Floats
-    length: Floats
-    turn: Floats
-
-    def heights(self, x: Floats, row: Ints) -> Floats:
-        """How far arcs lie outward of points `(q, 2)` on the facets of some rows `(q,)`."""
-        way = np.einsum("qd,qd->q", x - self.begin[row], self.direction[row])
-        return np.asarray(self.turn[row] / 2 * way * (1 - way / self.length[row]))
-
-
-def _chords(mesh: Mesh) -> _Chords:
-    """The legs of the boundary, and which of them look like chords of a curve."""
     facets = mesh.boundary
     cell = mesh.facet_to_cell[mesh.facet_to_cell[:, 1] < 0, 0]
     x = mesh.points[facets]
@@ -425,5 +405,5 @@ def _chords(mesh: Mesh) -> _Chords:
     is_curved = (turn_at_begin * turn_at_end > 0) & (larger_turn < _ROUND)
     is_curved &= (larger_turn < _ALIKE * smaller_turn) & (length < _ALIKE * neighbours).all(axis=0)
     turn = np.where(is_curved, (turn_at_begin + turn_at_end) / 2, 0.0)
-    direction = chord / np.linalg.norm(chord, axis=1)[:, None]
-    return _Chords(ends, mesh.points[ends[begin_facet, 0]][leg], direction, length[leg], turn[leg])
+    legs = np.stack([ends[begin_facet, 0], ends[end_facet, 1]], axis=1)
+    return ends, mesh.points[legs][leg], turn[leg]

@@ -130,9 +130,8 @@ def with_joins(rule: GrowthRule, step: Step, plan: Plan) -> Plan:
         share = _shares_of_stations(step, plan, facing_pairs, way, time, body)
     cracks_apart, part = _cracks_after(rule, step, plan, share), 1.0
     joined_now = _joined_cracks(rule, cracks_apart, facing_pairs, pairs_near, body)
-    for lesser_part in (
-        _PARTS if joined_now.failed_pairs else ()
-    ):  # fronts that overlap may join while they are apart
+    # Fronts that overlap may join while they are apart.
+    for lesser_part in _PARTS if joined_now.failed_pairs else ():
         cracks_before = _cracks_after(rule, step, plan, lesser_part * share)
         joined_sooner = _joined_cracks(
             rule, cracks_before, facing_pairs, [*pairs_near, *joined_now.failed_pairs], body

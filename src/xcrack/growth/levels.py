@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -321,7 +322,8 @@ def respond_to_states(
                 problem, states, reuse, bars, solver=rule.solver, known_bars=known_bars
             )
         else:
-            response = _from_elsewhere(rule, problem, states, reuse, bars, known_bars)
+            response_with = partial(_from_elsewhere, rule, problem, states, reuse)
+            response = with_known_bars(response_with, bars, known_bars)
         if load_factor != 1:
             response = replace(response, states=tuple(names), load_factor=load_factor)
         if spectrum is not None and response.solutions:
@@ -334,23 +336,13 @@ def respond_to_states(
 
 
 def _from_elsewhere(
-    rule: GrowthRule,
-    problem: Problem,
-    states: Sequence[Any],
-    reuse: SolverState,
-    bars: bool,
-    known_bars: KnownBars | None,
+    rule: GrowthRule, problem: Problem, states: Sequence[Any], reuse: SolverState, bars: bool
 ) -> Response:
-    """What the function of a user for K returns; it is asked for bars where none are known."""
-
-    def response_with(bars: bool) -> Response:
-        assert rule.response is not None
-        result = call_function(
-            rule.response, "the response of a step", problem, tuple(states), reuse, bars
-        )
-        return checked_response(result, problem, states)
-
-    return with_known_bars(response_with, bars, known_bars)
+    """What the function of a user for K returns."""
+    assert rule.response is not None
+    label = "the response of a step"
+    result = call_function(rule.response, label, problem, tuple(states), reuse, bars)
+    return checked_response(result, problem, states)
 
 
 def respond_under_program(

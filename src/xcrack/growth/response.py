@@ -252,10 +252,7 @@ def respond(
 def with_known_bars(
     response_with: Callable[[bool], Response], bars: bool, known_bars: KnownBars | None
 ) -> Response:
-    """A response whose bars are known beforehand, or found; by a function of whether it has bars.
-
-    Where they are found after all, warnings of K without them are not said twice.
-    """
+    """A response whose bars are known beforehand, or found; from what has them or not."""
     if not bars or known_bars is None:
         return response_with(bars)
     messages: list[str] = []
@@ -292,12 +289,6 @@ def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> 
 
 
 __all__ = [
-    "Answers",
-    "KnownBars",
-    "Respond",
-    "Response",
-    "best_K",
-    "checked_response",
-    "respond",
+    "Answers", "KnownBars", "Respond", "Response", "best_K", "checked_response", "respond",
     "with_known_bars",
-]
+]  # fmt: skip
