@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,7 @@ from xcrack.fatigue.criteria import clipped_K, equivalent_K, kink_angle
 from xcrack.fatigue.cycle import Cycle
 from xcrack.fatigue.spectrum import Spectrum, distinct_cycles
 from xcrack.growth.options import GrowthRule
-from xcrack.growth.response import (
-    KnownBars,
-    Response,
-    checked_response,
-    respond,
-    with_known_bars,
-)
+from xcrack.growth.response import KnownBars, Response, checked_response, respond
 from xcrack.linalg.engine import SolverState
 from xcrack.model.problem import LoadLevel, Problem
 from xcrack.sif.sif import SIF
@@ -322,8 +315,7 @@ def respond_to_states(
                 problem, states, reuse, bars, solver=rule.solver, known_bars=known_bars
             )
         else:
-            response_with = partial(_from_elsewhere, rule, problem, states, reuse)
-            response = with_known_bars(response_with, bars, known_bars)
+            response = _from_elsewhere(rule, problem, states, reuse, bars, known_bars)
         if load_factor != 1:
             response = replace(response, states=tuple(names), load_factor=load_factor)
         if spectrum is not None and response.solutions:
@@ -336,13 +328,28 @@ def respond_to_states(
 
 
 def _from_elsewhere(
-    rule: GrowthRule, problem: Problem, states: Sequence[Any], reuse: SolverState, bars: bool
+    rule: GrowthRule,
+    problem: Problem,
+    states: Sequence[Any],
+    reuse: SolverState,
+    bars: bool,
+    known_bars: KnownBars | None,
 ) -> Response:
-    """What the function of a user for K returns."""
-    assert rule.response is not None
-    label = "the response of a step"
-    result = call_function(rule.response, label, problem, tuple(states), reuse, bars)
-    return checked_response(result, problem, states)
+    """What the function of a user for K returns; it is asked for bars where none are known."""
+
+    def response_with(bars: bool) -> Response:
+        assert rule.response is not None
+        result = call_function(
+            rule.response, "the response of a step", problem, tuple(states), reuse, bars
+        )
+        return checked_response(result, problem, states)
+
+    if bars and known_bars is not None:
+        response = response_with(False)
+        sif = known_bars(response.sif)
+        if sif is not None:
+            return replace(response, sif=sif, has_known_bars=True)
+    return response_with(bars)
 
 
 def respond_under_program(

@@ -236,34 +236,24 @@ def respond(
         problem, states, reuse=reuse, solver=solver, is_repeated=True, error=bars and plane
     )
     handed_on = new_solutions[0].reuse
-    light = handed_on.without_factor()
-    solutions = tuple(copy_without_checks(s, reuse=light, factored=None) for s in new_solutions)
-
-    def response_with(bars: bool) -> Response:
-        by_crack = [stress_intensities(new_solutions, c, bars) for c in range(len(problem.cracks))]
-        sif = tuple(zip(*by_crack, strict=True))
-        return build_without_checks(
-            Response, states=states, sif=sif, solutions=solutions, reuse=handed_on
-        )
-
-    return with_known_bars(response_with, bars, known_bars)
-
-
-def with_known_bars(
-    response_with: Callable[[bool], Response], bars: bool, known_bars: KnownBars | None
-) -> Response:
-    """A response whose bars are known beforehand, or found; from what has them or not."""
-    if not bars or known_bars is None:
-        return response_with(bars)
+    cracks, sif = range(len(problem.cracks)), None
     messages: list[str] = []
-    with collected_warnings(messages):
-        response = response_with(False)
-    sif = known_bars(response.sif)
-    if sif is None:
-        return response_with(True)
+    if bars and known_bars is not None:
+        with collected_warnings(messages):
+            by_crack = [stress_intensities(new_solutions, c, False) for c in cracks]
+        sif = known_bars(tuple(zip(*by_crack, strict=True)))
+    has_known_bars = sif is not None
+    if sif is None:  # what was said of K without bars is said with them again
+        by_crack = [stress_intensities(new_solutions, c, bars) for c in cracks]
+        sif, messages = tuple(zip(*by_crack, strict=True)), []
     for message in messages:
         warn(message)
-    return copy_without_checks(response, sif=sif, has_known_bars=True)
+    light = handed_on.without_factor()
+    solutions = tuple(copy_without_checks(s, reuse=light, factored=None) for s in new_solutions)
+    return build_without_checks(
+        Response, states=states, sif=sif, solutions=solutions, reuse=handed_on,
+        has_known_bars=has_known_bars,
+    )  # fmt: skip
 
 
 def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> Response:
@@ -288,7 +278,4 @@ def checked_response(response: Any, problem: Problem, states: Sequence[Any]) -> 
     return response
 
 
-__all__ = [
-    "Answers", "KnownBars", "Respond", "Response", "best_K", "checked_response", "respond",
-    "with_known_bars",
-]  # fmt: skip
+__all__ = ["Answers", "KnownBars", "Respond", "Response", "best_K", "checked_response", "respond"]
