@@ -381,3 +381,18 @@ def test_steps_for_a_tolerance():
     assert step_error(0.0, 1.0, 0.0, 1.0, 0.0, 1e-2) == 1e-3
     assert step_error(0.0, 1.0, 0.02, 1.0, 0.0, 1e-2) == 2.0  # 2 % of the life of the step
     assert step_error(0.0, 1.0, 0.02, 1.0, 100.0, 1e-2) == pytest.approx(2 / 15)  # of a long life
+
+
+def test_a_response_of_ones_own_is_asked_for_bars_where_none_are_known():
+    """It solves as `respond` does: the same run, and bars of fewer solves than there are."""
+    calls = []
+
+    def solved(problem, states, reuse, bars):
+        calls.append(bars)
+        return respond(problem, states, reuse, bars)
+
+    options = run_of(tolerance=0.03, max_steps=4)
+    own, same = (xc.collect(xc.grow(**options, **named)) for named in ({"response": solved}, {}))
+    assert [step.cycles for step in own.steps] == [step.cycles for step in same.steps]
+    assert any(calls)
+    assert not all(calls)

@@ -176,3 +176,26 @@ def test_a_tolerance_in_space_names_chords_that_matter_more():
         assert len(messages) == count
         if count:
             assert "xc.fit_curves(mesh) has the curves" in messages[0]
+
+
+@pytest.mark.parametrize("ending", ["inp", "bdf"])
+def test_decks_that_have_lost_their_curves(tmp_path, ending):
+    """Of Abaqus and of Nastran: named, and given back where that is asked for."""
+    mesh, path = ring(12), tmp_path / f"part.{ending}"
+    if ending == "inp":
+        xc.write_mesh(path, mesh)
+    else:
+        x = np.concatenate([mesh.points, np.zeros((len(mesh.points), 1))], axis=1)
+        grids = [f"GRID,{i},,{a!r},{b!r},{c!r}" for i, (a, b, c) in enumerate(x.tolist(), 1)]
+        cells = [f"CTRIA3,{i},1,{a},{b},{c}" for i, (a, b, c) in enumerate(
+            (mesh.cells + 1).tolist(), 1)]  # fmt: skip
+        path.write_text("\n".join(["BEGIN BULK", *grids, *cells, "ENDDATA", ""]))
+    with pytest.warns(xc.XcrackWarning, match="like chords of a curve"):
+        assert not xc.read_deck(path).mesh.curves
+    deck = xc.read_deck(path, fit_curves=True).mesh
+    assert len(deck.curves) == (2 if ending == "inp" else 1)
+    for name in deck.curves:
+        x, on_curve = middles(deck, name)
+        radius = np.linalg.norm(on_curve, axis=1)
+        assert radius == pytest.approx(np.where(radius < 2, 1.0, 3.0), rel=2e-6)
+        assert (np.linalg.norm(x, axis=1) < radius - 1e-3).all()
