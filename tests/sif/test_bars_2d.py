@@ -238,6 +238,25 @@ def test_hole_whose_curve_is_not_known(size):
     assert K[2] == pytest.approx(K[0], abs=2 * 2e-3 * np.abs(K[0]).max())
 
 
+def test_chords_are_seen_after_they_are_bisected():
+    """What their curve changes is the same on finer cells of one polygon, to a tenth."""
+    mesh = xc.plate_with_hole(width=2, height=2, radius=0.25, size=0.28, size_near=0.14)
+    crack = xc.line_crack([(0.2, 0.01), (0.6, 0.01)])
+    shares = []
+    mesh = xc.Mesh(mesh.points, mesh.cells, mesh.facet_sets)
+    for body in (mesh, xc.refine(mesh)):
+        with pytest.warns(xc.XcrackWarning, match="chords of curves") as caught:
+            with_error(xc.Problem(body, UNIT, [crack], loads=PULLED))
+        shares += {
+            float(str(m.message).split("about ")[1].split()[0])
+            for m in caught
+            if "chords of curves" in str(m.message)
+        }
+    print(f"\nK changes by {shares}")
+    assert len(shares) == 2
+    assert shares[1] == pytest.approx(shares[0], rel=0.1)
+
+
 def edge(n=10, **options):
     mesh = xc.box((0, -1), (1, 1), (n, 2 * n))
     crack = xc.line_crack([(-0.3, 0.01), (options.pop("tip", 0.4), 0.01)])
